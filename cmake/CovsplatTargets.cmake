@@ -1,0 +1,28 @@
+# Helpers that every module's CMakeLists.txt uses.
+
+add_library(covsplat_options INTERFACE)
+target_include_directories(covsplat_options INTERFACE ${CMAKE_SOURCE_DIR})
+target_compile_options(covsplat_options INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
+if(COVSPLAT_WERROR)
+  target_compile_options(covsplat_options INTERFACE -Werror)
+endif()
+if(COVSPLAT_SANITIZE)
+  target_compile_options(covsplat_options INTERFACE
+    -fsanitize=${COVSPLAT_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(covsplat_options INTERFACE -fsanitize=${COVSPLAT_SANITIZE})
+endif()
+
+# covsplat_module(<name> SOURCES ... DEPS ...): the static library covsplat_<name>.
+function(covsplat_module name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  add_library(covsplat_${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(covsplat_${name} PUBLIC covsplat_options ${ARG_DEPS})
+endfunction()
+
+# covsplat_test(<name> SOURCES ... DEPS ...): one GoogleTest binary, each test known to CTest.
+function(covsplat_test name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE covsplat_options ${ARG_DEPS} GTest::gtest_main)
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+endfunction()
