@@ -1,0 +1,160 @@
+// What the stages of the CPU rasteriser hand to each other: plain arrays of one scalar type. The
+// map is rendered in float; tests run the same code in double.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "covsplat/core/se3.hpp"
+#include "covsplat/core/sensor_model.hpp"
+#include "covsplat/splat/gaussians.hpp"
+#include "covsplat/splat/splat_config.hpp"
+
+namespace covsplat {
+
+/// Tiles are 4 x 4 pixels: one pixel per lane of a pack.
+inline constexpr int kTileSide = 4;
+inline constexpr std::size_t kTilePixels = 16;
+
+/// A Gaussian as one view sees it, in the sensor frame: everything a ray needs to meet it.
+/// With c the centre, r_u and r_v the axes and s the scales: u = r_u / s_u, v = r_v / s_v, n the
+/// normal facing the sensor.
+template <class S>
+struct alignas(16 * sizeof(S)) SurfelRecord {
+  S u[3];
+  S v[3];
+  S n[3];
+  S plane;    ///< <n, c>
+  S u_c;      ///< <u, c>
+  S v_c;      ///< <v, c>
+  S opacity;  ///< 0 when the Gaussian cannot be seen from this view
+  S column;   ///< of the centre, px
+  S row;      ///< of the centre, px
+  S range;    ///< |c|
+};
+static_assert(sizeof(SurfelRecord<float>) == 64);
+
+/// Gaussians [begin, begin + count) of one anchor, count <= kBlockSize: the unit of projection and
+/// optimisation. Block i owns records [16 i, 16 i + 16).
+struct GaussianBlock {
+  std::uint32_t begin = 0;
+  std::uint16_t count = 0;
+  std::uint16_t transform = 0;  ///< index into the view's anchor transforms
+};
+
+/// T_sensor_anchor, rotation row-major.
+template <class S>
+struct AnchorTransform {
+  S rotation[9];
+  S translation[3];
+};
+
+/// Tiles [x0, x1] x [y0, y1] that a Gaussian may touch; x beyond the image wraps. Empty: x1 < x0.
+struct TileBox {
+  std::int16_t x0 = 0;
+  std::int16_t x1 = -1;
+  std::int16_t y0 = 0;
+  std::int16_t y1 = -1;
+};
+
+/// Constants of a sensor and a raster configuration, in the rasteriser's scalar.
+template <class S>
+struct ViewGeometry {
+  ViewGeometry(const SensorModel& sensor, const RasterConfig& config);
+
+  int rows = 0;
+  int columns = 0;
+  int tile_rows = 0;
+  int tile_columns = 0;
+  std::size_t Tiles() const {
+    return static_cast<std::size_t>(tile_rows) * static_cast<std::size_t>(tile_columns);
+  }
+
+  // Rays are separable: (cos el cos az, cos el sin az, sin el), 16 values for each tile column or
+  // tile row. Lanes below the last image row repeat it and are masked by missing targets.
+  std::vector<S> cos_azimuth, sin_azimuth;      ///< [tile_columns x 16]
+  std::vector<S> cos_elevation, sin_elevation;  ///< [tile_rows x 16]
+
+  std::vector<S> row_table;
+  S row_table_origin_rad;
+  S row_table_samples_per_rad;
+
+  S near_m, far_m;
+  S alpha_min, alpha_cap, transmittance_min;
+  S lowpass, grazing_cosine, depth_ratio;
+  bool two_sided;
+};
+
+/// Where a pixel is in the tile-by-tile arrays below.
+template <class S>
+std::size_t PixelIndex(const ViewGeometry<S>& view, int row, int column) {
+  const auto tile =
+      static_cast<std::size_t>((row / kTileSide) * view.tile_columns + column / kTileSide);
+  const auto lane = static_cast<std::size_t>((row % kTileSide) * kTileSide + column % kTileSide);
+  return kTilePixels * tile + lane;
+}
+
+/// One Gaussian in one tile's list.
+struct TilePair {
+  std::uint32_t record = 0;
+  std::uint32_t slot = 0;  ///< where its 16 gradient sums go; slots are ordered by record
+};
+
+/// Which Gaussians touch which tile, front to back.
+struct TileBins {
+  std::vector<std::uint32_t> tile_begin;  ///< [tiles + 1] into pairs
+  std::vector<TilePair> pairs;
+  std::vector<std::uint32_t> slot_begin;  ///< [records + 1]
+};
+
+/// Per-pixel sums of front-to-back blending (w = alpha * transmittance), tile by tile, 16 each.
+template <class S>
+struct TileImages {
+  void Resize(std::size_t tiles);
+
+  std::vector<S> transmittance;  ///< what is left of the ray: 1 - A
+  std::vector<S> range_sum;      ///< sum of w * range
+  std::vector<S> median;         ///< range of the last Gaussian met with transmittance > 0.5
+  std::vector<S> normal_x, normal_y, normal_z;  ///< sum of w * normal, sensor frame
+};
+
+/// Gradient of a scalar with respect to every value of TileImages but the transmittance, and with
+/// respect to A = 1 - transmittance.
+template <class S>
+struct TileGradients {
+  void Resize(std::size_t tiles);
+
+  std::vector<S> alpha, range_sum, median, normal_x, normal_y, normal_z;
+};
+
+/// A keyframe's measurements, tile by tile. Range 0: no return; normal 0: unknown.
+template <class S>
+struct TileTargets {
+  void Resize(std::size_t tiles);
+
+  std::vector<S> range_m;
+  std::vector<S> normal_x, normal_y, normal_z;  ///< from the scan's covariances, sensor frame
+  /// From the rendered surface, sensor frame; all 0 while the surface-normal term is off.
+  std::vector<S> surface_x, surface_y, surface_z;
+  std::size_t valid_ranges = 0;
+  std::size_t valid_normals = 0;
+};
+
+/// Terms of the loss, each already weighted and averaged as it enters the total.
+struct LossSums {
+  double range = 0.0;
+  double opacity = 0.0;
+  double normal = 0.0;
+
+  double Total() const { return range + opacity + normal; }
+  LossSums& operator+=(const LossSums& other) {
+    range += other.range;
+    opacity += other.opacity;
+    normal += other.normal;
+    return *this;
+  }
+};
+
+}  // namespace covsplat

@@ -1,0 +1,47 @@
+// The tile kernels: blending front to back, the loss of each pixel, and the gradient back to front.
+#pragma once
+
+#include "covsplat/splat/cpu/raster_data.hpp"
+
+namespace covsplat {
+
+/// Everything a tile needs. `upstream` adds a gradient on the images to that of the loss.
+template <class S>
+struct TileJob {
+  const ViewGeometry<S>* view = nullptr;
+  const SurfelRecord<S>* records = nullptr;
+  const TileBins* bins = nullptr;
+  TileImages<S>* images = nullptr;
+
+  // For gradients only.
+  const TileTargets<S>* targets = nullptr;
+  const LossConfig* loss = nullptr;
+  const TileGradients<S>* upstream = nullptr;  ///< may be null
+  S* slots = nullptr;                          ///< [16 x pairs]
+  std::uint8_t* slot_used = nullptr;           ///< [pairs], set to 1 where a slot was written
+};
+
+/// What the 16 sums in a gradient slot are; all are linear in the ray, so that pixels just add up.
+enum GradientSum : int {
+  kSumU = 0,        ///< 3: with respect to u
+  kSumV = 3,        ///< 3: with respect to v
+  kSumNormal = 6,   ///< 3: with respect to n
+  kSumPlane = 9,    ///< <n, c>
+  kSumUC = 10,      ///< <u, c>
+  kSumVC = 11,      ///< <v, c>
+  kSumAlpha = 12,   ///< alpha * d/d alpha
+  kSumColumn = 13,  ///< of the centre
+  kSumRow = 14,     ///< of the centre
+  kSumRange = 15    ///< of the centre
+};
+
+/// Renders tiles [begin, end) into `images`.
+template <class S>
+void RenderTiles(const TileJob<S>& job, std::size_t begin, std::size_t end);
+
+/// Renders tiles [begin, end), evaluates the loss of their pixels and leaves its gradient in the
+/// slots. Tiles without any measurement are skipped unless there is an upstream gradient.
+template <class S>
+LossSums StepTiles(const TileJob<S>& job, std::size_t begin, std::size_t end);
+
+}  // namespace covsplat

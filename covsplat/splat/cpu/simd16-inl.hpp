@@ -1,0 +1,379 @@
+// Packs of 16 scalars, one for each pixel of a 4x4 tile or each Gaussian of a block, in as many
+// vectors as the instruction set needs. Included once per target, as Highway's own -inl headers
+// are.
+
+// clang-format off
+#if defined(COVSPLAT_SPLAT_CPU_SIMD16_INL_HPP_) == defined(HWY_TARGET_TOGGLE)
+#ifdef COVSPLAT_SPLAT_CPU_SIMD16_INL_HPP_
+#undef COVSPLAT_SPLAT_CPU_SIMD16_INL_HPP_
+#else
+#define COVSPLAT_SPLAT_CPU_SIMD16_INL_HPP_
+#endif
+// clang-format on
+
+#include <cstddef>
+
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace covsplat::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class S>
+using Tag = hn::CappedTag<S, 16>;
+
+template <class S>
+inline constexpr std::size_t kLanes = hn::MaxLanes(Tag<S>());
+
+template <class S>
+inline constexpr std::size_t kParts = 16 / kLanes<S>;
+
+template <class S>
+struct Pack {
+  hn::Vec<Tag<S>> part[kParts<S>];
+};
+
+template <class S>
+struct PackMask {
+  hn::Mask<Tag<S>> part[kParts<S>];
+};
+
+// Element-wise operations. Macros only because each is the same loop around one Highway call.
+#define COVSPLAT_PACK_BINARY(NAME, OP)                          \
+  template <class S>                                            \
+  HWY_INLINE Pack<S> NAME(const Pack<S>& a, const Pack<S>& b) { \
+    Pack<S> r;                                                  \
+    for (std::size_t i = 0; i < kParts<S>; ++i) {               \
+      r.part[i] = hn::OP(a.part[i], b.part[i]);                 \
+    }                                                           \
+    return r;                                                   \
+  }
+COVSPLAT_PACK_BINARY(operator+, Add)
+COVSPLAT_PACK_BINARY(operator-, Sub)
+COVSPLAT_PACK_BINARY(operator*, Mul)
+COVSPLAT_PACK_BINARY(operator/, Div)
+COVSPLAT_PACK_BINARY(Min, Min)
+COVSPLAT_PACK_BINARY(Max, Max)
+#undef COVSPLAT_PACK_BINARY
+
+#define COVSPLAT_PACK_UNARY(NAME, OP)             \
+  template <class S>                              \
+  HWY_INLINE Pack<S> NAME(const Pack<S>& a) {     \
+    Pack<S> r;                                    \
+    for (std::size_t i = 0; i < kParts<S>; ++i) { \
+      r.part[i] = hn::OP(a.part[i]);              \
+    }                                             \
+    return r;                                     \
+  }
+COVSPLAT_PACK_UNARY(operator-, Neg)
+COVSPLAT_PACK_UNARY(Abs, Abs)
+COVSPLAT_PACK_UNARY(Sqrt, Sqrt)
+#undef COVSPLAT_PACK_UNARY
+
+#define COVSPLAT_PACK_COMPARE(NAME, OP)                             \
+  template <class S>                                                \
+  HWY_INLINE PackMask<S> NAME(const Pack<S>& a, const Pack<S>& b) { \
+    PackMask<S> r;                                                  \
+    for (std::size_t i = 0; i < kParts<S>; ++i) {                   \
+      r.part[i] = hn::OP(a.part[i], b.part[i]);                     \
+    }                                                               \
+    return r;                                                       \
+  }
+COVSPLAT_PACK_COMPARE(operator<, Lt)
+COVSPLAT_PACK_COMPARE(operator<=, Le)
+COVSPLAT_PACK_COMPARE(operator>, Gt)
+COVSPLAT_PACK_COMPARE(operator>=, Ge)
+COVSPLAT_PACK_COMPARE(Equal, Eq)
+#undef COVSPLAT_PACK_COMPARE
+
+template <class S>
+HWY_INLINE Pack<S> All(S value) {
+  Pack<S> r;
+  for (std::size_t i = 0; i < kParts<S>; ++i) r.part[i] = hn::Set(Tag<S>(), value);
+  return r;
+}
+
+template <class S>
+HWY_INLINE Pack<S> LoadPack(const S* HWY_RESTRICT from) {
+  Pack<S> r;
+  for (std::size_t i = 0; i < kParts<S>; ++i) r.part[i] = hn::LoadU(Tag<S>(), from + i * kLanes<S>);
+  return r;
+}
+
+template <class S>
+HWY_INLINE void StorePack(const Pack<S>& a, S* HWY_RESTRICT to) {
+  for (std::size_t i = 0; i < kParts<S>; ++i) hn::StoreU(a.part[i], Tag<S>(), to + i * kLanes<S>);
+}
+
+/// Stores the lanes of a mask only.
+template <class S>
+HWY_INLINE void StoreMasked(const PackMask<S>& mask, const Pack<S>& a, S* HWY_RESTRICT to) {
+  for (std::size_t i = 0; i < kParts<S>; ++i) {
+    hn::BlendedStore(a.part[i], mask.part[i], Tag<S>(), to + i * kLanes<S>);
+  }
+}
+
+/// a * b + c.
+template <class S>
+HWY_INLINE Pack<S> MulAdd(const Pack<S>& a, const Pack<S>& b, const Pack<S>& c) {
+  Pack<S> r;
+  for (std::size_t i = 0; i < kParts<S>; ++i)
+    r.part[i] = hn::MulAdd(a.part[i], b.part[i], c.part[i]);
+  return r;
+}
+
+/// c - a * b.
+template <class S>
+HWY_INLINE Pack<S> NegMulAdd(const Pack<S>& a, const Pack<S>& b, const Pack<S>& c) {
+  Pack<S> r;
+  for (std::size_t i = 0; i < kParts<S>; ++i) {
+    r.part[i] = hn::NegMulAdd(a.part[i], b.part[i], c.part[i]);
+  }
+  return r;
+}
+
+template <class S>
+HWY_INLINE PackMask<S> operator&(const PackMask<S>& a, const PackMask<S>& b) {
+  PackMask<S> r;
+  for (std::size_t i = 0; i < kParts<S>; ++i) r.part[i] = hn::And(a.part[i], b.part[i]);
+  return r;
+}
+
+template <class S>
+HWY_INLINE Pack<S> Select(const PackMask<S>& mask, const Pack<S>& yes, const Pack<S>& no) {
+  Pack<S> r;
+  for (std::size_t i = 0; i < kParts<S>; ++i) {
+    r.part[i] = hn::IfThenElse(mask.part[i], yes.part[i], no.part[i]);
+  }
+  return r;
+}
+
+template <class S>
+HWY_INLINE Pack<S> SelectOrZero(const PackMask<S>& mask, const Pack<S>& yes) {
+  Pack<S> r;
+  for (std::size_t i = 0; i < kParts<S>; ++i) {
+    r.part[i] = hn::IfThenElseZero(mask.part[i], yes.part[i]);
+  }
+  return r;
+}
+
+template <class S>
+HWY_INLINE bool None(const PackMask<S>& mask) {
+  bool none = true;
+  for (std::size_t i = 0; i < kParts<S>; ++i) none = none && hn::AllFalse(Tag<S>(), mask.part[i]);
+  return none;
+}
+
+template <class S>
+HWY_INLINE S SumOfLanes(const Pack<S>& a) {
+  hn::Vec<Tag<S>> sum = a.part[0];
+  for (std::size_t i = 1; i < kParts<S>; ++i) sum = hn::Add(sum, a.part[i]);
+  return hn::GetLane(hn::SumOfLanes(Tag<S>(), sum));
+}
+
+/// 1 / a; in float one Newton step from the hardware's estimate, good to 1e-7.
+template <class S>
+HWY_INLINE Pack<S> Reciprocal(const Pack<S>& a) {
+  if constexpr (sizeof(S) == 4) {
+    Pack<S> r;
+    for (std::size_t i = 0; i < kParts<S>; ++i) {
+      const auto estimate = hn::ApproximateReciprocal(a.part[i]);
+      r.part[i] = hn::Mul(estimate, hn::NegMulAdd(estimate, a.part[i], hn::Set(Tag<S>(), S(2))));
+    }
+    return r;
+  } else {
+    return All(S(1)) / a;
+  }
+}
+
+/// exp(a) for -87 <= a <= 88; float: degree-6 polynomial on the fraction of a / ln 2, 1e-7
+/// relative.
+template <class S>
+HWY_INLINE Pack<S> ExpBounded(const Pack<S>& a) {
+  Pack<S> r;
+  for (std::size_t i = 0; i < kParts<S>; ++i) {
+    if constexpr (sizeof(S) == 4) {
+      const Tag<S> d;
+      const hn::RebindToSigned<Tag<S>> di;
+      const auto scaled = hn::Mul(a.part[i], hn::Set(d, S(1.44269504088896341)));
+      const auto whole = hn::Round(scaled);
+      const auto f = hn::Sub(scaled, whole);
+      auto p = hn::Set(d, S(1.5403530e-4));
+      p = hn::MulAdd(p, f, hn::Set(d, S(1.3333558e-3)));
+      p = hn::MulAdd(p, f, hn::Set(d, S(9.6181291e-3)));
+      p = hn::MulAdd(p, f, hn::Set(d, S(5.5504109e-2)));
+      p = hn::MulAdd(p, f, hn::Set(d, S(2.4022651e-1)));
+      p = hn::MulAdd(p, f, hn::Set(d, S(6.9314718e-1)));
+      p = hn::MulAdd(p, f, hn::Set(d, S(1)));
+      const auto exponent = hn::ShiftLeft<23>(hn::ConvertTo(di, whole));
+      r.part[i] = hn::BitCast(d, hn::Add(hn::BitCast(di, p), exponent));
+    } else {
+      r.part[i] = hn::Exp(Tag<S>(), a.part[i]);
+    }
+  }
+  return r;
+}
+
+template <class S>
+HWY_INLINE Pack<S> Log(const Pack<S>& a) {
+  Pack<S> r;
+  for (std::size_t i = 0; i < kParts<S>; ++i) r.part[i] = hn::Log(Tag<S>(), a.part[i]);
+  return r;
+}
+
+template <class S>
+HWY_INLINE Pack<S> Atan2(const Pack<S>& y, const Pack<S>& x) {
+  Pack<S> r;
+  const Tag<S> d;
+  const auto half_pi = hn::Set(d, S(1.57079632679489661923));
+  const auto pi = hn::Set(d, S(3.14159265358979323846));
+  const auto tiny = hn::Set(d, S(1e-30));
+  for (std::size_t i = 0; i < kParts<S>; ++i) {
+    const auto ax = hn::Abs(x.part[i]);
+    const auto ay = hn::Abs(y.part[i]);
+    const auto steep = hn::Gt(ay, ax);
+    const auto ratio = hn::Div(hn::Min(ax, ay), hn::Max(hn::Max(ax, ay), tiny));
+    auto angle = hn::Atan(d, ratio);
+    angle = hn::IfThenElse(steep, hn::Sub(half_pi, angle), angle);
+    angle = hn::IfThenElse(hn::Lt(x.part[i], hn::Zero(d)), hn::Sub(pi, angle), angle);
+    r.part[i] = hn::CopySign(angle, y.part[i]);
+  }
+  return r;
+}
+
+/// table[floor(position)] interpolated linearly; `slope` is the difference of the two entries.
+/// position must be within [0, table size - 1).
+template <class S>
+HWY_INLINE Pack<S> LookUp(const S* HWY_RESTRICT table, const Pack<S>& position, Pack<S>& slope) {
+  Pack<S> r;
+  const Tag<S> d;
+  const hn::RebindToSigned<Tag<S>> di;
+  for (std::size_t i = 0; i < kParts<S>; ++i) {
+    const auto index = hn::ConvertTo(di, position.part[i]);
+    const auto low = hn::GatherIndex(d, table, index);
+    const auto high = hn::GatherIndex(d, table + 1, index);
+    const auto fraction = hn::Sub(position.part[i], hn::ConvertTo(d, index));
+    slope.part[i] = hn::Sub(high, low);
+    r.part[i] = hn::MulAdd(fraction, slope.part[i], low);
+  }
+  return r;
+}
+
+// Blocks of 128 bits: the unit in which all instruction sets shuffle alike.
+template <class S>
+inline constexpr std::size_t kBlock = 16 / sizeof(S);
+
+template <class S, class D, class V>
+HWY_INLINE hn::Vec<hn::CappedTag<S, kBlock<S>>> SumOfBlocks(D d, V v) {
+  if constexpr (hn::MaxLanes(D()) <= kBlock<S>) {
+    (void)d;
+    return v;
+  } else {
+    const hn::Half<D> half;
+    return SumOfBlocks<S>(half, hn::Add(hn::LowerHalf(half, v), hn::UpperHalf(half, v)));
+  }
+}
+
+/// Sums of the lanes of 16 packs: out[k] = sum of terms[k], in an order that depends on nothing but
+/// the instruction set.
+template <class S>
+HWY_INLINE void SumEach(const Pack<S> (&terms)[16], S* HWY_RESTRICT out) {
+  const Tag<S> d;
+  hn::Vec<Tag<S>> v[16];
+  for (std::size_t k = 0; k < 16; ++k) {
+    v[k] = terms[k].part[0];
+    for (std::size_t i = 1; i < kParts<S>; ++i) v[k] = hn::Add(v[k], terms[k].part[i]);
+  }
+  const hn::CappedTag<S, kBlock<S>> block;
+  if constexpr (sizeof(S) == 4) {
+    const hn::Repartition<double, Tag<S>> wide;
+    for (std::size_t k = 0; k < 16; k += 4) {
+      const auto p =
+          hn::Add(hn::InterleaveLower(d, v[k], v[k + 1]), hn::InterleaveUpper(d, v[k], v[k + 1]));
+      const auto q = hn::Add(hn::InterleaveLower(d, v[k + 2], v[k + 3]),
+                             hn::InterleaveUpper(d, v[k + 2], v[k + 3]));
+      const auto pw = hn::BitCast(wide, p);
+      const auto qw = hn::BitCast(wide, q);
+      const auto sums = hn::Add(hn::BitCast(d, hn::InterleaveLower(wide, pw, qw)),
+                                hn::BitCast(d, hn::InterleaveUpper(wide, pw, qw)));
+      hn::StoreU(SumOfBlocks<S>(d, sums), block, out + k);
+    }
+  } else {
+    for (std::size_t k = 0; k < 16; k += 2) {
+      const auto sums =
+          hn::Add(hn::InterleaveLower(d, v[k], v[k + 1]), hn::InterleaveUpper(d, v[k], v[k + 1]));
+      hn::StoreU(SumOfBlocks<S>(d, sums), block, out + k);
+    }
+  }
+}
+
+/// out[j][i] = in[i][j] for 16 x 16 scalars.
+template <class S>
+HWY_INLINE void Transpose16(const S* HWY_RESTRICT in, S* HWY_RESTRICT out) {
+  const hn::CappedTag<S, kBlock<S>> d;
+  for (std::size_t i = 0; i < 16; i += kBlock<S>) {
+    for (std::size_t j = 0; j < 16; j += kBlock<S>) {
+      if constexpr (sizeof(S) == 4) {
+        const hn::Repartition<double, decltype(d)> wide;
+        const auto r0 = hn::LoadU(d, in + (i + 0) * 16 + j);
+        const auto r1 = hn::LoadU(d, in + (i + 1) * 16 + j);
+        const auto r2 = hn::LoadU(d, in + (i + 2) * 16 + j);
+        const auto r3 = hn::LoadU(d, in + (i + 3) * 16 + j);
+        const auto a = hn::BitCast(wide, hn::InterleaveLower(d, r0, r1));
+        const auto b = hn::BitCast(wide, hn::InterleaveLower(d, r2, r3));
+        const auto e = hn::BitCast(wide, hn::InterleaveUpper(d, r0, r1));
+        const auto f = hn::BitCast(wide, hn::InterleaveUpper(d, r2, r3));
+        hn::StoreU(hn::BitCast(d, hn::InterleaveLower(wide, a, b)), d, out + (j + 0) * 16 + i);
+        hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(wide, a, b)), d, out + (j + 1) * 16 + i);
+        hn::StoreU(hn::BitCast(d, hn::InterleaveLower(wide, e, f)), d, out + (j + 2) * 16 + i);
+        hn::StoreU(hn::BitCast(d, hn::InterleaveUpper(wide, e, f)), d, out + (j + 3) * 16 + i);
+      } else {
+        const auto r0 = hn::LoadU(d, in + (i + 0) * 16 + j);
+        const auto r1 = hn::LoadU(d, in + (i + 1) * 16 + j);
+        hn::StoreU(hn::InterleaveLower(d, r0, r1), d, out + (j + 0) * 16 + i);
+        hn::StoreU(hn::InterleaveUpper(d, r0, r1), d, out + (j + 1) * 16 + i);
+      }
+    }
+  }
+}
+
+// Three packs as the coordinates of 16 vectors.
+template <class S>
+struct Pack3 {
+  Pack<S> x, y, z;
+};
+
+template <class S>
+HWY_INLINE Pack<S> Dot(const Pack3<S>& a, const Pack3<S>& b) {
+  return MulAdd(a.x, b.x, MulAdd(a.y, b.y, a.z * b.z));
+}
+
+template <class S>
+HWY_INLINE Pack3<S> Cross(const Pack3<S>& a, const Pack3<S>& b) {
+  return {NegMulAdd(a.z, b.y, a.y * b.z),
+          NegMulAdd(a.x, b.z, a.z * b.x),
+          NegMulAdd(a.y, b.x, a.x * b.y)};
+}
+
+template <class S>
+HWY_INLINE Pack3<S> operator+(const Pack3<S>& a, const Pack3<S>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+
+template <class S>
+HWY_INLINE Pack3<S> operator*(const Pack<S>& s, const Pack3<S>& a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
+
+/// s * a + b.
+template <class S>
+HWY_INLINE Pack3<S> MulAdd(const Pack<S>& s, const Pack3<S>& a, const Pack3<S>& b) {
+  return {MulAdd(s, a.x, b.x), MulAdd(s, a.y, b.y), MulAdd(s, a.z, b.z)};
+}
+
+}  // namespace covsplat::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // COVSPLAT_SPLAT_CPU_SIMD16_INL_HPP_

@@ -1,0 +1,77 @@
+// The map's primitives: flat 2D Gaussians (surfels) stored one column per parameter.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace covsplat {
+
+/// Optimised parameters of a Gaussian. Its in-plane axes and normal are the columns of the rotation
+/// matrix of the unit quaternion; the standard deviations along the axes are exp(log scale) metres;
+/// its opacity is the logistic function of the logit. Mean and orientation are in the frame of the
+/// Gaussian's anchor (its keyframe).
+enum Parameter : int {
+  kMeanX,
+  kMeanY,
+  kMeanZ,
+  kQuatW,
+  kQuatX,
+  kQuatY,
+  kQuatZ,
+  kLogScaleU,
+  kLogScaleV,
+  kOpacityLogit,
+  kParameterCount
+};
+
+/// Directions in which a Gaussian is optimised: mean in its anchor's frame, rotation vector in its
+/// own frame (q <- q * exp(delta)), log scales, opacity logit.
+enum Tangent : int {
+  kTangentMean = 0,
+  kTangentRotation = 3,
+  kTangentLogScaleU = 6,
+  kTangentLogScaleV = 7,
+  kTangentOpacityLogit = 8,
+  kTangentCount = 9
+};
+
+/// The rasteriser works on blocks of this many consecutive Gaussians and reads whole blocks.
+inline constexpr std::size_t kBlockSize = 16;
+
+/// Equally long columns, each followed by kBlockSize readable values.
+template <class S, int kColumns>
+class ColumnTable {
+ public:
+  std::size_t Size() const { return size_; }
+
+  void Resize(std::size_t size) {
+    size_ = size;
+    for (auto& column : columns_) column.resize(size + kBlockSize);
+  }
+
+  S* Column(int column) { return columns_[static_cast<std::size_t>(column)].data(); }
+  const S* Column(int column) const { return columns_[static_cast<std::size_t>(column)].data(); }
+
+  /// Moves row `from` to row `to`.
+  void MoveRow(std::size_t from, std::size_t to) {
+    for (auto& column : columns_) column[to] = column[from];
+  }
+
+ private:
+  std::size_t size_ = 0;
+  std::array<std::vector<S>, kColumns> columns_ = {};
+};
+
+template <class S>
+using GaussianColumns = ColumnTable<S, kParameterCount>;
+
+/// Gaussians [begin, end) of a table live in the frame of one anchor. `begin` is a multiple of
+/// kBlockSize, so that no two ranges share a block; what lies between ranges is padding.
+struct AnchorRange {
+  int anchor = 0;
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
+}  // namespace covsplat

@@ -1,0 +1,151 @@
+#include "covsplat/splat/engine.hpp"
+
+#include <cstring>
+
+#include "tests/splat/scenes.hpp"
+#include <gtest/gtest.h>
+
+namespace covsplat {
+namespace {
+
+SensorModel Sensor() { return UniformSensorModel(32, 256, -0.4, 0.4, 0.5, 30.0); }
+
+/// A room of 10 x 8 m seen from its middle.
+RangeMeasurement RoomMeasurement(const SensorModel& sensor) {
+  RangeMeasurement m{
+      Image<float>(sensor.Rows(), sensor.Columns(), 0.0f),
+      Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::Zero())};
+  for (int row = 0; row < sensor.Rows(); ++row) {
+    for (int column = 0; column < sensor.Columns(); ++column) {
+      const Eigen::Vector3f ray = sensor.RayOf(row, column);
+      const float tx = 5.0f / std::max(std::abs(ray.x()), 1e-6f);
+      const float ty = 4.0f / std::max(std::abs(ray.y()), 1e-6f);
+      m.range_m(row, column) = std::min(tx, ty);
+      m.normal(row, column) = tx < ty ? Eigen::Vector3f(ray.x() < 0 ? 1.0f : -1.0f, 0.0f, 0.0f)
+                                      : Eigen::Vector3f(0.0f, ray.y() < 0 ? 1.0f : -1.0f, 0.0f);
+    }
+  }
+  return m;
+}
+
+/// Surfels on the room's walls, displaced and tilted by noise.
+GaussianColumns<float> NoisyRoom(const SensorModel& sensor, const RangeMeasurement& m) {
+  GaussianColumns<float> table;
+  table.Resize(static_cast<std::size_t>(sensor.Rows() * sensor.Columns() / 4));
+  Rng rng(3);
+  std::size_t i = 0;
+  for (int row = 0; row < sensor.Rows(); row += 2) {
+    for (int column = 0; column < sensor.Columns(); column += 2) {
+      const Eigen::Vector3d tilt(rng.Normal(), rng.Normal(), rng.Normal());
+      const Eigen::Vector3d normal =
+          (m.normal(row, column).cast<double>() + 0.15 * tilt).normalized();
+      const double range = m.range_m(row, column) + 0.05 * rng.Normal();
+      const Eigen::Vector3d mean = range * sensor.RayOf(row, column).cast<double>();
+      const Eigen::Quaterniond q =
+          Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), normal);
+      SetGaussian(table, i++, mean, q, 0.1, 0.1, 0.5);
+    }
+  }
+  return table;
+}
+
+std::unique_ptr<SplatEngine> MakeEngine(ThreadPool& pool) {
+  return std::move(MakeSplatEngine(Backend::kCpu, Sensor(), {}, pool).value());
+}
+
+double MeanRangeError(const RenderOutput& render, const RangeMeasurement& m) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < m.range_m.Size(); ++i) {
+    sum += std::abs(render.range_m.Pixels()[i] - m.range_m.Pixels()[i]);
+  }
+  return sum / static_cast<double>(m.range_m.Size());
+}
+
+TEST(SplatEngine, OptimisingExplainsTheMeasurement) {
+  ThreadPool pool(2);
+  const auto engine = MakeEngine(pool);
+  const RangeMeasurement m = RoomMeasurement(Sensor());
+  const SE3 pose = SE3::Exp((Vector6d() << 0.1, 0.2, -0.4, 10.0, -5.0, 2.0).finished());
+  const int anchor = engine->AddAnchor(pose);
+  engine->Append(anchor, NoisyRoom(Sensor(), m));
+  engine->SetView(anchor, m);
+  const double before = MeanRangeError(engine->Render(pose), m);
+  StepReport first;
+  StepReport last;
+  for (int i = 0; i < 200; ++i) {
+    last = engine->Step(anchor, i > 50);
+    if (i == 0) first = last;
+  }
+  EXPECT_LT(last.range_loss, 0.3 * first.range_loss);
+  EXPECT_LT(last.opacity_loss, first.opacity_loss);
+  EXPECT_LT(MeanRangeError(engine->Render(pose), m), 0.3 * before);
+}
+
+TEST(SplatEngine, SameBitsForAnyNumberOfThreads) {
+  const RangeMeasurement m = RoomMeasurement(Sensor());
+  const auto optimise = [&](int threads) {
+    ThreadPool pool(threads);
+    const auto engine = MakeEngine(pool);
+    engine->AddAnchor(SE3());
+    engine->Append(0, NoisyRoom(Sensor(), m));
+    engine->SetView(0, m);
+    for (int i = 0; i < 25; ++i) engine->Step(0, true);
+    return engine->Gaussians();
+  };
+  const GaussianColumns<float> one = optimise(1);
+  for (const int threads : {2, 5}) {
+    const GaussianColumns<float> many = optimise(threads);
+    for (int p = 0; p < kParameterCount; ++p) {
+      EXPECT_EQ(std::memcmp(one.Column(p), many.Column(p), one.Size() * sizeof(float)), 0);
+    }
+  }
+}
+
+TEST(SplatEngine, AMovedAnchorTakesItsGaussiansAlong) {
+  ThreadPool pool(1);
+  const auto engine = MakeEngine(pool);
+  const RangeMeasurement m = RoomMeasurement(Sensor());
+  engine->AddAnchor(SE3());
+  engine->Append(0, NoisyRoom(Sensor(), m));
+  const RenderOutput before = engine->Render(SE3());
+  const SE3 moved = SE3::Exp((Vector6d() << 0.3, -0.2, 1.0, 100.0, 50.0, -3.0).finished());
+  engine->SetAnchorPose(0, moved);
+  const RenderOutput after = engine->Render(moved);
+  for (std::size_t i = 0; i < before.range_m.Size(); ++i) {
+    ASSERT_NEAR(before.range_m.Pixels()[i], after.range_m.Pixels()[i], 1e-3f);
+  }
+}
+
+TEST(SplatEngine, KeepRemovesTheOthersAndNothingElse) {
+  ThreadPool pool(1);
+  const auto engine = MakeEngine(pool);
+  engine->AddAnchor(SE3());
+  engine->AddAnchor(SE3());
+  engine->Append(0, RandomGaussians<float>(37, 0.0, 1));
+  engine->Append(1, RandomGaussians<float>(50, 1.0, 2));
+  const GaussianColumns<float> before = engine->Gaussians();
+  std::vector<std::uint8_t> keep(before.Size(), 1);
+  for (std::size_t i = 0; i < keep.size(); i += 3) keep[i] = 0;
+  const std::vector<std::size_t> old_row = engine->Keep(keep);
+  std::size_t kept = 0;
+  for (const AnchorRange& range : engine->Ranges()) {
+    EXPECT_EQ(range.begin % kBlockSize, 0u);
+    for (std::size_t i = range.begin; i < range.end; ++i, ++kept) {
+      EXPECT_EQ(keep[old_row[i]], 1);
+      for (int p = 0; p < kParameterCount; ++p) {
+        EXPECT_EQ(engine->Gaussians().Column(p)[i], before.Column(p)[old_row[i]]);
+      }
+    }
+  }
+  EXPECT_EQ(kept, 87u - 30u);  // of 37 rows 13 go, of 50 rows (from row 48) 17
+}
+
+TEST(SplatEngine, CudaIsAClearErrorWithoutIt) {
+  ThreadPool pool(1);
+  const auto engine = MakeSplatEngine(Backend::kCuda, Sensor(), {}, pool);
+  ASSERT_FALSE(engine.has_value());
+  EXPECT_EQ(engine.error().code, ErrorCode::kUnavailable);
+}
+
+}  // namespace
+}  // namespace covsplat
