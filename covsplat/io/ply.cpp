@@ -1,0 +1,113 @@
+#include "covsplat/io/ply.hpp"
+
+#include "covsplat/core/check.hpp"
+#include "covsplat/io/output_file.hpp"
+#include "covsplat/io/ply_body.hpp"
+#include "covsplat/io/ply_header.hpp"
+#include "covsplat/io/text.hpp"
+
+namespace covsplat {
+namespace {
+
+tl::unexpected<Error> NoElement(const std::string& file, std::string_view name) {
+  return Fail(ErrorCode::kInput, "{}: has no element \"{}\"", file, name);
+}
+
+std::vector<float> Floats(const PointColumn& column) {
+  const std::vector<double> doubles = column.Doubles();
+  return {doubles.begin(), doubles.end()};
+}
+
+Result<std::vector<Eigen::Vector3f>> Positions(const PointTable& table, const std::string& file) {
+  std::array<std::vector<float>, 3> axes;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const char name = "xyz"[axis];
+    const PointColumn* column = table.Find(std::string_view(&name, 1));
+    if (column == nullptr) {
+      return Fail(ErrorCode::kInput, "{}: its vertices have no property {}", file, name);
+    }
+    axes[axis] = Floats(*column);
+  }
+  std::vector<Eigen::Vector3f> positions;
+  for (std::size_t i = 0; i < axes[0].size(); ++i) {
+    positions.emplace_back(axes[0][i], axes[1][i], axes[2][i]);
+  }
+  return positions;
+}
+
+std::string HeaderText(const PointTable& vertices) {
+  std::string text = "ply\nformat binary_little_endian 1.0\n";
+  for (const std::string& comment : vertices.comments) {
+    COVSPLAT_CHECK(comment.find('\n') == std::string::npos);
+    text += "comment " + comment + "\n";
+  }
+  text += fmt::format("element vertex {}\n", vertices.Rows());
+  for (const PointColumn& column : vertices.columns) {
+    COVSPLAT_CHECK(column.Size() == vertices.Rows() && !PlyTypeName(column.Type()).empty());
+    text += fmt::format("property {} {}\n", PlyTypeName(column.Type()), column.name);
+  }
+  return text + "end_header\n";
+}
+
+}  // namespace
+
+Result<PointTable> ReadPly(const std::filesystem::path& path) {
+  const Result<std::string> bytes = ReadFile(path);
+  if (!bytes) return Forward(bytes);
+  return ParsePly(*bytes, path.string());
+}
+
+Result<PointTable> ParsePly(std::string_view bytes, const std::string& file) {
+  const Result<PlyHeader> header = ParsePlyHeader(bytes, file);
+  if (!header) return Forward(header);
+  PlyBody body(bytes, *header, file);
+  for (const PlyElement& element : header->elements) {
+    Result<std::vector<PointColumn>> columns = body.ReadColumns(element);
+    if (!columns) return Forward(columns);
+    if (element.name == "vertex") return PointTable{std::move(*columns), header->comments};
+  }
+  return NoElement(file, "vertex");
+}
+
+Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path) {
+  const Result<std::string> bytes = ReadFile(path);
+  if (!bytes) return Forward(bytes);
+  return ParseTriangleMesh(*bytes, path.string());
+}
+
+Result<TriangleMesh> ParseTriangleMesh(std::string_view bytes, const std::string& file) {
+  const Result<PlyHeader> header = ParsePlyHeader(bytes, file);
+  if (!header) return Forward(header);
+  PlyBody body(bytes, *header, file);
+  TriangleMesh mesh;
+  for (const PlyElement& element : header->elements) {
+    if (element.name == "face") {
+      auto triangles = body.ReadTriangles(element, mesh.vertices.size());
+      if (!triangles) return Forward(triangles);
+      mesh.triangles = std::move(*triangles);
+      return mesh;
+    }
+    Result<std::vector<PointColumn>> columns = body.ReadColumns(element);
+    if (!columns) return Forward(columns);
+    if (element.name != "vertex") continue;
+    auto positions = Positions({std::move(*columns), {}}, file);
+    if (!positions) return Forward(positions);
+    mesh.vertices = std::move(*positions);
+  }
+  return NoElement(file, "face");
+}
+
+Result<void> WritePly(const std::filesystem::path& path, const PointTable& vertices) {
+  std::string bytes = HeaderText(vertices);
+  std::size_t stride = 0;
+  for (const PointColumn& column : vertices.columns) stride += SizeOf(column.Type());
+  std::size_t first = bytes.size();
+  bytes.resize(first + stride * vertices.Rows());
+  for (const PointColumn& column : vertices.columns) {
+    CopyBytes(column.values, bytes.data() + first, stride);
+    first += SizeOf(column.Type());
+  }
+  return WriteFileAtomically(path, bytes);
+}
+
+}  // namespace covsplat

@@ -1,0 +1,38 @@
+// PLY files: named columns of vertices, and triangle meshes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "covsplat/core/result.hpp"
+#include "covsplat/io/point_table.hpp"
+
+namespace covsplat {
+
+/// The vertices of a PLY file, ascii or binary of either byte order, with all their scalar
+/// properties and the comments of the header. Other elements are passed over.
+Result<PointTable> ReadPly(const std::filesystem::path& path);
+/// The same from bytes in memory; `file` is for messages.
+Result<PointTable> ParsePly(std::string_view bytes, const std::string& file);
+
+struct TriangleMesh {
+  std::vector<Eigen::Vector3f> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices of vertices
+};
+
+/// The vertices and faces of a PLY file; faces of more than three corners become fans.
+Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path);
+/// The same from bytes in memory; `file` is for messages.
+Result<TriangleMesh> ParseTriangleMesh(std::string_view bytes, const std::string& file);
+
+/// Writes the vertices as binary_little_endian, at once. Comments must be single lines; columns of
+/// 64-bit integers do not exist in PLY.
+Result<void> WritePly(const std::filesystem::path& path, const PointTable& vertices);
+
+}  // namespace covsplat

@@ -1,0 +1,123 @@
+#include "covsplat/io/recording_writer.hpp"
+
+#include <array>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "covsplat/core/check.hpp"
+#include "covsplat/io/trajectory_file.hpp"
+
+namespace covsplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kMarker = ".covsplat_recording";
+constexpr std::array<const char*, 2> kBinaryFolders = {"velodyne", "timestamps"};
+
+std::string BinaryName(std::int64_t index) { return fmt::format("{:06}.bin", index); }
+
+// Removes what this class wrote and does not open anew; its scans are numbered without a gap.
+void RemoveOldRecording(const fs::path& folder) {
+  std::error_code ignored;
+  fs::remove(folder / "groundtruth_tum.txt", ignored);
+  for (const char* name : kBinaryFolders) {
+    std::int64_t index = 0;
+    while (fs::remove(folder / name / BinaryName(index), ignored)) ++index;
+  }
+}
+
+Result<void> PrepareFolder(const fs::path& folder, bool overwrite) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  const bool empty = !error && fs::is_empty(folder, error);
+  if (!error && !empty && !overwrite) {
+    return Fail(ErrorCode::kOutput,
+                "{}: is not empty; choose another folder, or allow to overwrite",
+                folder.string());
+  }
+  if (!error && fs::exists(folder / kMarker, error)) RemoveOldRecording(folder);
+  for (const char* name : kBinaryFolders) {
+    if (!error) fs::create_directories(folder / name, error);
+    if (!error && !fs::is_empty(folder / name, error)) {
+      return Fail(ErrorCode::kOutput,
+                  "{}: holds files that were not written here; choose another folder",
+                  (folder / name).string());
+    }
+  }
+  if (error) {
+    return Fail(ErrorCode::kOutput, "{}: cannot be written: {}", folder.string(), error.message());
+  }
+  return WriteFileAtomically(folder / kMarker, "written by covsplat\n");
+}
+
+// Not synced to the storage file by file: that takes longer than writing them.
+Result<void> WriteBinary(const fs::path& path, std::string_view bytes) {
+  Result<AppendFile> file = AppendFile::Open(path);
+  if (!file) return Forward(file);
+  return file->Append(bytes).and_then([&] { return file->Close(); });
+}
+
+template <class T>
+std::string_view BytesOf(const std::vector<T>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
+}
+
+std::vector<float> Records(const Scan& scan) {
+  std::vector<float> records;
+  records.reserve(4 * scan.points.size());
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const Eigen::Vector3f& point = scan.points[i];
+    records.insert(records.end(), {point.x(), point.y(), point.z()});
+    records.push_back(scan.intensity.empty() ? 0.0f : scan.intensity[i]);
+  }
+  return records;
+}
+
+}  // namespace
+
+Result<RecordingWriter> RecordingWriter::Create(const fs::path& folder, bool overwrite) {
+  const Result<void> prepared = PrepareFolder(folder, overwrite);
+  if (!prepared) return Forward(prepared);
+  Result<AppendFile> times = AppendFile::Open(folder / "times.txt");
+  if (!times) return Forward(times);
+  Result<AppendFile> poses = AppendFile::Open(folder / "poses.txt");
+  if (!poses) return Forward(poses);
+  return RecordingWriter(folder, std::move(*times), std::move(*poses));
+}
+
+Result<void> RecordingWriter::Write(const Scan& scan, const SE3& T_world_sensor) {
+  COVSPLAT_CHECK(scan.intensity.empty() || scan.intensity.size() == scan.points.size());
+  const std::int64_t index = count_++;
+  const fs::path file = folder_ / "velodyne" / BinaryName(index);
+  return WriteBinary(file, BytesOf(Records(scan)))
+      .and_then([&] { return WritePointTimes(scan, index); })
+      .and_then([&] { return poses_.Append(KittiLine(T_world_sensor)); })
+      .and_then([&] { return times_.Append(fmt::format("{:.9f}\n", scan.stamp_s)); });
+}
+
+Result<void> RecordingWriter::WritePointTimes(const Scan& scan, std::int64_t index) {
+  const bool has_times = !scan.time_offset_s.empty();
+  COVSPLAT_CHECK(!has_times || scan.time_offset_s.size() == scan.points.size());
+  const bool first_with_points = !has_point_times_ && !scan.points.empty();
+  if (!scan.points.empty()) {
+    COVSPLAT_CHECK(has_point_times_.value_or(has_times) == has_times);
+    has_point_times_ = has_times;
+  }
+  if (!has_point_times_.value_or(false)) return {};
+  // Scans without points that came before any with points have no times either.
+  for (std::int64_t i = first_with_points ? 0 : index; i < index; ++i) {
+    const Result<void> none = WriteBinary(folder_ / "timestamps" / BinaryName(i), "");
+    if (!none) return none;
+  }
+  return WriteBinary(folder_ / "timestamps" / BinaryName(index), BytesOf(scan.time_offset_s));
+}
+
+Result<void> RecordingWriter::Finish(const Trajectory& dense_truth) {
+  const Result<void> truth = WriteTum(folder_ / "groundtruth_tum.txt", dense_truth);
+  if (!truth) return truth;
+  return times_.Close().and_then([&] { return poses_.Close(); });
+}
+
+}  // namespace covsplat

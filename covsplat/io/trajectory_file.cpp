@@ -1,0 +1,173 @@
+#include "covsplat/io/trajectory_file.hpp"
+
+#include <cmath>
+#include <optional>
+#include <string_view>
+
+#include "covsplat/io/output_file.hpp"
+#include "covsplat/io/text.hpp"
+
+namespace covsplat {
+namespace {
+
+// Some programs write quaternions and matrices with four decimals.
+constexpr double kRotationTolerance = 0.01;
+
+tl::unexpected<Error> BadLine(const std::filesystem::path& path,
+                              const LineReader& reader,
+                              std::string_view problem) {
+  return Fail(ErrorCode::kInput, "{}:{}: {}", path.string(), reader.Number(), problem);
+}
+
+bool AllFinite(std::span<const double> numbers) {
+  for (const double number : numbers) {
+    if (!std::isfinite(number)) return false;
+  }
+  return true;
+}
+
+std::optional<TimedPose> TumPose(std::span<const double> n) {
+  if (n.size() != 8 || !AllFinite(n)) return std::nullopt;
+  const Eigen::Quaterniond rotation(n[7], n[4], n[5], n[6]);
+  if (std::abs(rotation.norm() - 1.0) > kRotationTolerance) return std::nullopt;
+  return TimedPose{n[0], SE3(rotation, {n[1], n[2], n[3]})};
+}
+
+// Calls take(numbers) for every line with content; take returns what is wrong with it, or "".
+template <class Take>
+Result<void> ForEachLine(const std::filesystem::path& path, Take&& take) {
+  const Result<std::string> text = ReadFile(path);
+  if (!text) return Forward(text);
+  LineReader reader(*text);
+  while (reader.NextWithContent()) {
+    const auto numbers = ParseDoubles(reader.Line());
+    if (!numbers) return BadLine(path, reader, "holds something that is not a number");
+    const std::string_view problem = take(*numbers);
+    if (!problem.empty()) return BadLine(path, reader, problem);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string TumLine(const TimedPose& pose) {
+  const Eigen::Vector3d& t = pose.T_world_sensor.Translation();
+  const Eigen::Quaterniond& q = pose.T_world_sensor.Rotation();
+  return fmt::format("{:.9f} {} {} {} {} {} {} {}\n",
+                     pose.stamp_s,
+                     t.x(),
+                     t.y(),
+                     t.z(),
+                     q.x(),
+                     q.y(),
+                     q.z(),
+                     q.w());
+}
+
+std::string KittiLine(const SE3& pose) {
+  const Eigen::Matrix4d matrix = pose.Matrix();
+  std::string line;
+  for (int k = 0; k < 12; ++k) {
+    line += fmt::format("{}{}", k == 0 ? "" : " ", matrix(k / 4, k % 4));
+  }
+  return line + "\n";
+}
+
+Result<void> WriteTum(const std::filesystem::path& path, const Trajectory& trajectory) {
+  std::string text;
+  for (const TimedPose& pose : trajectory) text += TumLine(pose);
+  return WriteFileAtomically(path, text);
+}
+
+Result<void> WriteKittiPoses(const std::filesystem::path& path, const Trajectory& trajectory) {
+  std::string text;
+  for (const TimedPose& pose : trajectory) text += KittiLine(pose.T_world_sensor);
+  return WriteFileAtomically(path, text);
+}
+
+Result<Trajectory> ReadTum(const std::filesystem::path& path) {
+  Trajectory trajectory;
+  const Result<void> read = ForEachLine(path, [&](const std::vector<double>& numbers) {
+    const std::optional<TimedPose> pose = TumPose(numbers);
+    if (!pose) return "expected stamp x y z qx qy qz qw with a quaternion of length 1";
+    if (!trajectory.empty() && pose->stamp_s <= trajectory.back().stamp_s) {
+      return "its time is not later than that of the line before";
+    }
+    trajectory.push_back(*pose);
+    return "";
+  });
+  if (!read) return Forward(read);
+  return trajectory;
+}
+
+Result<std::vector<SE3>> ReadKittiPoses(const std::filesystem::path& path) {
+  std::vector<SE3> poses;
+  const Result<void> read = ForEachLine(path, [&](const std::vector<double>& numbers) {
+    const std::optional<SE3> pose = PoseOfMatrix(numbers);
+    if (!pose) return "expected the 12 numbers of a 3x4 matrix of rotation and translation";
+    poses.push_back(*pose);
+    return "";
+  });
+  if (!read) return Forward(read);
+  return poses;
+}
+
+Result<std::vector<double>> ReadStamps(const std::filesystem::path& path) {
+  std::vector<double> stamps;
+  const Result<void> read = ForEachLine(path, [&](const std::vector<double>& numbers) {
+    if (numbers.size() != 1 || !AllFinite(numbers)) return "expected one time in seconds";
+    if (!stamps.empty() && numbers[0] < stamps.back()) {
+      return "its time is earlier than that of the line before";
+    }
+    stamps.push_back(numbers[0]);
+    return "";
+  });
+  if (!read) return Forward(read);
+  return stamps;
+}
+
+Result<Trajectory> LoadTrajectory(const std::filesystem::path& path,
+                                  std::span<const double> stamps_s) {
+  const Result<std::string> text = ReadFile(path);
+  if (!text) return Forward(text);
+  LineReader reader(*text);
+  if (!reader.NextWithContent()) {
+    return Fail(ErrorCode::kInput, "{}: holds no poses", path.string());
+  }
+  const std::size_t columns = SplitWords(reader.Line()).size();
+  if (columns == 8) return ReadTum(path);
+  if (columns != 12) {
+    return BadLine(path, reader, "expected 8 numbers (TUM) or 12 (KITTI)");
+  }
+  const Result<std::vector<SE3>> poses = ReadKittiPoses(path);
+  if (!poses) return Forward(poses);
+  return WithStamps(*poses, stamps_s, path);
+}
+
+Result<Trajectory> WithStamps(const std::vector<SE3>& poses,
+                              std::span<const double> stamps_s,
+                              const std::filesystem::path& path) {
+  if (poses.size() != stamps_s.size()) {
+    return Fail(ErrorCode::kInput,
+                "{}: holds {} poses for {} times; they have to match line by line",
+                path.string(),
+                poses.size(),
+                stamps_s.size());
+  }
+  Trajectory trajectory;
+  for (std::size_t i = 0; i < poses.size(); ++i) trajectory.push_back({stamps_s[i], poses[i]});
+  return trajectory;
+}
+
+std::optional<SE3> PoseOfMatrix(std::span<const double> numbers) {
+  if (numbers.size() != 12 || !AllFinite(numbers)) return std::nullopt;
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  for (int k = 0; k < 12; ++k) matrix(k / 4, k % 4) = numbers[static_cast<std::size_t>(k)];
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+  const Eigen::Matrix3d gram = rotation * rotation.transpose();
+  const bool orthonormal = gram.isIdentity(kRotationTolerance) && rotation.determinant() > 0.0;
+  if (!orthonormal) return std::nullopt;
+  return SE3::FromMatrix(matrix);
+}
+
+}  // namespace covsplat
