@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
 #include <numbers>
 #include <vector>
 
@@ -133,7 +132,7 @@ Controls WalkOnce(const ClosedPath& path, Rng& rng) {
   return controls;
 }
 
-// Sum of sinusoids in time with seeded phases.
+// A sinusoid in time.
 struct Wave {
   double amplitude = 0.0;
   double frequency_hz = 0.0;
@@ -161,7 +160,9 @@ struct Gait {
   Wave bounce_m, sway_m, roll_rad, pitch_rad, yaw_rad, look_rad, glance_rad;
 };
 
-SE3 WalkerPose(const Controls& controls, const Gait& gait, double time_s) {
+using Ground = std::function<double(double, double)>;
+
+SE3 WalkerPose(const Controls& controls, const Gait& gait, const Ground& ground, double time_s) {
   const auto last = static_cast<std::ptrdiff_t>(controls.size()) - 1;
   const auto control_at = [&](std::ptrdiff_t i) -> const Eigen::Vector4d& {
     return controls[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i, 0, last))];
@@ -173,7 +174,7 @@ SE3 WalkerPose(const Controls& controls, const Gait& gait, double time_s) {
   const Eigen::Vector3d position(
       state(0) - sway_m * std::sin(heading),
       state(1) + sway_m * std::cos(heading),
-      CourtyardGround(state(0), state(1)) + kSensorHeightM + strength * gait.bounce_m.At(time_s));
+      ground(state(0), state(1)) + kSensorHeightM + strength * gait.bounce_m.At(time_s));
   const double yaw = heading + strength * (gait.yaw_rad.At(time_s) + gait.look_rad.At(time_s) +
                                            gait.glance_rad.At(time_s));
   const Eigen::Quaterniond rotation =
@@ -183,16 +184,17 @@ SE3 WalkerPose(const Controls& controls, const Gait& gait, double time_s) {
   return {rotation, position};
 }
 
-Motion Handheld(std::vector<Eigen::Vector2d> route, int seed) {
+Motion Handheld(std::vector<Eigen::Vector2d> route, Ground ground, int seed) {
   Rng rng(static_cast<std::uint64_t>(seed), 1);
   for (Eigen::Vector2d& point : route) {
     point += Eigen::Vector2d(rng.Uniform(-0.1, 0.1), rng.Uniform(-0.1, 0.1));
   }
   Controls controls = WalkOnce(ClosedPath(route), rng);
   const double duration_s = kKnotS * static_cast<double>(controls.size() - 3);
-  return {duration_s, [controls = std::move(controls), gait = Gait(rng)](double time_s) {
-            return WalkerPose(controls, gait, time_s);
-          }};
+  const auto pose_at =
+      [controls = std::move(controls), gait = Gait(rng), ground = std::move(ground)](
+          double time_s) { return WalkerPose(controls, gait, ground, time_s); };
+  return {duration_s, pose_at};
 }
 
 }  // namespace
@@ -206,7 +208,7 @@ Result<Motion> MakeMotion(std::string_view world, std::string_view name, int see
   if (name != "handheld") {
     return Fail(ErrorCode::kUsage, "unknown motion '{}'; known: {}", name, fmt::join(kNames, ", "));
   }
-  return Handheld(CourtyardRoute(), seed);
+  return Handheld(CourtyardRoute(), CourtyardGround, seed);
 }
 
 }  // namespace covsplat

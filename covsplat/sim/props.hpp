@@ -2,6 +2,8 @@
 // on the ground that it stands on, in the world frame, lengths in metres.
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 
 #include "covsplat/core/rng.hpp"

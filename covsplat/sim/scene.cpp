@@ -1,8 +1,10 @@
 #include "covsplat/sim/scene.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <embree3/rtcore.h>

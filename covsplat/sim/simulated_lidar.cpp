@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <vector>
 
 #include "covsplat/core/check.hpp"
 #include "covsplat/core/rng.hpp"
