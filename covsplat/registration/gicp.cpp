@@ -1,0 +1,200 @@
+#include "covsplat/registration/gicp.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+#include "covsplat/registration/degeneracy.hpp"
+#include "covsplat/registration/motion_prior.hpp"
+#include "covsplat/registration/scan_residuals.hpp"
+
+namespace covsplat {
+namespace {
+
+constexpr std::size_t kMinMatches = 20;
+constexpr double kMinKernelScale = 1e-12;  // of noise-free data
+constexpr double kInfiniteKernel = 1e12;
+
+// Cauchy scale for e^T M e whose median is that of a one-dimensional normal residual (0.455
+// sigma^2): matches are point-to-plane in effect.
+double KernelScale(double median_square, double width) {
+  return std::max(width * width * median_square / 0.455, kMinKernelScale);
+}
+
+int Unknowns(MotionModel model, double duration_s) {
+  if (duration_s <= 0.0 || model == MotionModel::kRigid) return 6;
+  return model == MotionModel::kVelocity ? 12 : 18;
+}
+
+ScanMotion Moved(const ScanMotion& motion, const Vector18d& step) {
+  return {motion.T_map_sensor * SE3::Exp(step.head<6>()),
+          motion.twist + step.segment<6>(6),
+          motion.acceleration + step.tail<6>()};
+}
+
+// One registration: the problem and where its iterations stand.
+class Aligner {
+ public:
+  Aligner(const SourceCloud& source,
+          const RegistrationTarget& target,
+          const MotionPrediction& prediction,
+          const GicpConfig& config,
+          ThreadPool& pool)
+      : target_(target),
+        predicted_(prediction.motion),
+        config_(config),
+        pool_(pool),
+        unknowns_(Unknowns(config.motion_model, source.duration_s)),
+        prior_(prediction, source.duration_s, config),
+        residuals_(source,
+                   target,
+                   config.max_correspondence_m,
+                   config.inlier_distance_m,
+                   config.planar_weight,
+                   pool) {
+    result_.motion = prediction.motion;
+  }
+
+  AlignResult Run() && {
+    // Until residuals have been seen there is no scale to judge outliers by.
+    residuals_.Evaluate(result_.motion, kInfiniteKernel, pool_);
+    double median = residuals_.MedianSquare();
+    PhaseMoments moments =
+        residuals_.Reevaluate(result_.motion, KernelScale(median, config_.kernel_width), pool_);
+    while (moments.matches >= kMinMatches && result_.iterations < config_.max_iterations) {
+      ++result_.iterations;
+      const Vector18d step = Solve(moments, result_.motion);
+      if (!step.allFinite()) break;
+      const ScanMotion candidate = Moved(result_.motion, step);
+      const PhaseMoments next =
+          residuals_.Evaluate(candidate, KernelScale(median, config_.kernel_width), pool_);
+      const double next_median = residuals_.MedianSquare();
+      if (next.matches < kMinMatches || next_median > kWorse * median + kMinKernelScale) {
+        damping_ = std::max(10.0 * damping_, kFirstDamping);
+        if (damping_ > kMaxDamping) break;
+        continue;
+      }
+      damping_ *= 0.1;
+      result_.motion = candidate;
+      moments = next;
+      median = next_median;
+      if (IsSmall(step)) {
+        result_.converged = true;
+        break;
+      }
+    }
+    return Finish(moments);
+  }
+
+ private:
+  // A step is undone if it makes the median residual worse by this.
+  static constexpr double kWorse = 1.5;
+  static constexpr double kFirstDamping = 1e-2;
+  static constexpr double kMaxDamping = 1e3;
+
+  // Data and prior, both in units of the residuals' variance, with weak directions tied down.
+  Vector18d Solve(const PhaseMoments& moments, const ScanMotion& motion) {
+    NormalEquations equations = Assemble(moments, motion);
+    const double variance = std::max(moments.weighted_square / moments.kernel_sum, 1e-30);
+    equations.hessian /= variance;
+    equations.gradient /= variance;
+    const Eigen::Matrix3d R = motion.T_map_sensor.RotationMatrix();
+    weak_ = FindWeakDirections(equations.hessian.topLeftCorner<6, 6>(),
+                               moments.lever[0] / variance,
+                               R.transpose() * moments.Inertia() * R / variance,
+                               config_.degeneracy_ratio);
+    information_ = equations.hessian;
+    prior_.AddTo(equations, motion, 1.0);
+    HoldWeakDirections(equations, motion);
+    equations.hessian.diagonal() *= 1.0 + damping_;
+    Vector18d step = Vector18d::Zero();
+    step.head(unknowns_) = equations.hessian.topLeftCorner(unknowns_, unknowns_)
+                               .ldlt()
+                               .solve(-equations.gradient.head(unknowns_));
+    return step;
+  }
+
+  void HoldWeakDirections(NormalEquations& equations, const ScanMotion& motion) const {
+    constexpr double kStiff = 1e6;
+    Vector18d offset;
+    offset << (predicted_.T_map_sensor.Inverse() * motion.T_map_sensor).Log(),
+        motion.twist - predicted_.twist, motion.acceleration - predicted_.acceleration;
+    const auto hold = [&](const Eigen::Vector3d& direction, int at) {
+      const double stiffness = kStiff * equations.hessian.diagonal().segment<3>(at % 6).maxCoeff();
+      const double along = direction.dot(offset.segment<3>(at));
+      equations.hessian.block<3, 3>(at, at) += stiffness * direction * direction.transpose();
+      equations.gradient.segment<3>(at) += stiffness * along * direction;
+    };
+    for (int block = 0; block < 18; block += 6) {
+      for (const Eigen::Vector3d& direction : weak_.rotations) hold(direction, block);
+      for (const Eigen::Vector3d& direction : weak_.translations) hold(direction, block + 3);
+    }
+  }
+
+  bool IsSmall(const Vector18d& step) const {
+    return step.head<3>().norm() < config_.rotation_epsilon_rad &&
+           step.segment<3>(3).norm() < config_.translation_epsilon_m;
+  }
+
+  AlignResult Finish(const PhaseMoments& moments) {
+    result_.squared_distance = residuals_.SquaredDistances();
+    result_.surfel = residuals_.Slots();
+    for (int& slot : result_.surfel) slot = slot < 0 ? -1 : target_.SurfelOf(slot);
+    if (result_.iterations == 0) return std::move(result_);
+    result_.correspondences = moments.matches;
+    result_.inlier_ratio =
+        static_cast<double>(moments.inliers) / static_cast<double>(result_.surfel.size());
+    result_.rms_residual_m = std::sqrt(moments.plane_square / moments.kernel_sum);
+    result_.weak_rotations = weak_.rotations;
+    result_.weak_translations = weak_.translations;
+    result_.degenerate_directions =
+        static_cast<int>(weak_.rotations.size() + weak_.translations.size());
+    result_.information = PoseInformation();
+    return std::move(result_);
+  }
+
+  // Marginalises the motion within the scan, which data and its prior determine.
+  Matrix6d PoseInformation() const {
+    const int inner = unknowns_ - 6;
+    if (inner == 0) return information_.topLeftCorner<6, 6>();
+    NormalEquations prior{Matrix18d::Zero(), Vector18d::Zero()};
+    prior_.AddTo(prior, result_.motion, 1.0);
+    const Eigen::MatrixXd within = information_.block(6, 6, inner, inner) +
+                                   prior.hessian.block(6, 6, inner, inner) +
+                                   1e-9 * Eigen::MatrixXd::Identity(inner, inner);
+    const Eigen::MatrixXd cross = information_.block(0, 6, 6, inner);
+    return information_.topLeftCorner<6, 6>() - cross * within.ldlt().solve(cross.transpose());
+  }
+
+  const RegistrationTarget& target_;
+  const ScanMotion predicted_;
+  const GicpConfig& config_;
+  ThreadPool& pool_;
+  const int unknowns_;
+  const MotionPrior prior_;
+  ScanResiduals residuals_;
+  AlignResult result_;
+  WeakDirections weak_;
+  Matrix18d information_ = Matrix18d::Zero();
+  double damping_ = 0.0;
+};
+
+}  // namespace
+
+AlignResult Align(const SourceCloud& source,
+                  const RegistrationTarget& target,
+                  const MotionPrediction& prediction,
+                  const GicpConfig& config,
+                  ThreadPool& pool) {
+  if (!prediction.motion.IsFinite()) {
+    AlignResult result;
+    result.motion = prediction.motion;
+    result.squared_distance.assign(source.Size(), std::numeric_limits<float>::infinity());
+    result.surfel.assign(source.Size(), -1);
+    return result;
+  }
+  return Aligner(source, target, prediction, config, pool).Run();
+}
+
+}  // namespace covsplat

@@ -1,0 +1,126 @@
+// Align: continuous-time generalised ICP of one scan to a set of surfels (paper eqs. 1 to 5).
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "covsplat/core/config_field.hpp"
+#include "covsplat/core/parallel.hpp"
+#include "covsplat/registration/motion.hpp"
+#include "covsplat/registration/preprocess.hpp"
+#include "covsplat/registration/target.hpp"
+
+namespace covsplat {
+
+/// What is estimated of the motion within a scan; the rest is taken from the prediction.
+enum class MotionModel {
+  kRigid,         ///< only the pose: 6 unknowns
+  kVelocity,      ///< pose and twist: 12
+  kAcceleration,  ///< pose, twist and its change within the scan: 18
+};
+
+template <>
+struct EnumNames<MotionModel> {
+  static constexpr std::array<EnumName<MotionModel>, 3> kNames = {{
+      {MotionModel::kRigid, "rigid"},
+      {MotionModel::kVelocity, "velocity"},
+      {MotionModel::kAcceleration, "acceleration"},
+  }};
+};
+
+struct GicpConfig {
+  double max_correspondence_m = 1.0;
+  int max_iterations = 30;
+  double rotation_epsilon_rad = 5e-5;
+  double translation_epsilon_m = 2e-4;
+  double kernel_width = 2.0;
+  bool planar_weight = true;
+  double inlier_distance_m = 0.1;
+  double degeneracy_ratio = 0.02;
+  MotionModel motion_model = MotionModel::kAcceleration;
+  double angular_acceleration_radps2 = 8.0;
+  double linear_acceleration_mps2 = 4.0;
+  double begin_rotation_rad = 5e-3;
+  double begin_translation_m = 0.02;
+
+  template <class Self, class V>
+  static void Visit(Self& c, V&& v) {
+    v.Field("max_correspondence_m",
+            c.max_correspondence_m,
+            Range{0.01, 20.0},
+            "match points to surfels nearer than this");
+    v.Field("max_iterations", c.max_iterations, Range{1, 200}, "Gauss-Newton steps at most");
+    v.Field("rotation_epsilon_rad",
+            c.rotation_epsilon_rad,
+            Range{0.0, 1.0},
+            "converged when a step turns less than this");
+    v.Field("translation_epsilon_m",
+            c.translation_epsilon_m,
+            Range{0.0, 1.0},
+            "... and moves less than this");
+    v.Field("kernel_width",
+            c.kernel_width,
+            Range{0.1, 100.0},
+            "width of the robust kernel in robust standard deviations of the residual");
+    v.Field("planar_weight", c.planar_weight, "weight matches by planarity (paper eq. 5)");
+    v.Field("inlier_distance_m",
+            c.inlier_distance_m,
+            Range{1e-3, 10.0},
+            "a match is an inlier when it is this near to its surfel's plane");
+    v.Field("degeneracy_ratio",
+            c.degeneracy_ratio,
+            Range{0.0, 1.0},
+            "directions with less than this share of the information that surfaces facing every "
+            "way would give keep the prediction");
+    v.Field("motion_model", c.motion_model, "what to estimate of the motion within a scan");
+    v.Field("angular_acceleration_radps2",
+            c.angular_acceleration_radps2,
+            Range{0.01, 1000.0},
+            "motion prior: standard deviation of the angular acceleration");
+    v.Field("linear_acceleration_mps2",
+            c.linear_acceleration_mps2,
+            Range{0.01, 1000.0},
+            "motion prior: standard deviation of the linear acceleration");
+    v.Field("begin_rotation_rad",
+            c.begin_rotation_rad,
+            Range{1e-5, 10.0},
+            "motion prior: rotation between the end of a scan and the begin of the next");
+    v.Field("begin_translation_m",
+            c.begin_translation_m,
+            Range{1e-5, 100.0},
+            "motion prior: translation between the end of a scan and the begin of the next");
+  }
+};
+
+/// Outcome of a registration. Without enough matches the motion is the prediction and everything
+/// else is zero.
+struct AlignResult {
+  ScanMotion motion;
+  /// Of the pose at mid scan, with the motion within the scan marginalised out. Right perturbation
+  /// [rad, m], in 1/rad^2 and 1/m^2, from the residuals' own variance; it takes matches as
+  /// independent and the map as perfect, so it is an upper bound.
+  Matrix6d information = Matrix6d::Zero();
+  int iterations = 0;
+  bool converged = false;
+  std::size_t correspondences = 0;      ///< source points with a surfel within the gate
+  double inlier_ratio = 0.0;            ///< inliers over all source points
+  double rms_residual_m = 0.0;          ///< point to plane, robustly weighted
+  std::vector<float> squared_distance;  ///< [source] to the nearest surfel's mean, inf if unmatched
+  std::vector<int> surfel;              ///< [source] the nearest surfel's index, -1 if unmatched
+
+  /// Directions of the mid pose that the scan does not determine; they keep the prediction.
+  int degenerate_directions = 0;
+  std::vector<Eigen::Vector3d> weak_rotations;     ///< unit axes, sensor frame at mid scan
+  std::vector<Eigen::Vector3d> weak_translations;  ///< unit directions, sensor frame at mid scan
+};
+
+/// Estimates the motion of the sensor during a scan. Bit-identical for any number of threads.
+AlignResult Align(const SourceCloud& source,
+                  const RegistrationTarget& target,
+                  const MotionPrediction& prediction,
+                  const GicpConfig& config,
+                  ThreadPool& pool);
+
+}  // namespace covsplat

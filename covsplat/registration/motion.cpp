@@ -1,0 +1,68 @@
+#include "covsplat/registration/motion.hpp"
+
+#include <algorithm>
+
+#include "covsplat/core/check.hpp"
+
+namespace covsplat {
+namespace {
+
+// Share of the acceleration that is expected to last into the next scan. A gait of 1.5 Hz seen at
+// 10 Hz has an autocorrelation of cos(0.94) = 0.59 from scan to scan.
+constexpr double kAccelerationLasts = 0.5;
+
+}  // namespace
+
+MotionPrediction PredictMotion(const ScanMotion& previous,
+                               double previous_duration_s,
+                               double duration_s,
+                               double gap_s) {
+  MotionPrediction prediction;
+  if (!(previous_duration_s > 0.0 && duration_s > 0.0 && gap_s > 0.0)) {
+    prediction.motion.T_map_sensor = previous.T_map_sensor;
+    prediction.sigma_scale = 0.0;
+    return prediction;
+  }
+  // Units of the previous scan's duration, counted from that scan's end.
+  const double length = duration_s / previous_duration_s;
+  const double middle = gap_s / previous_duration_s - 0.5;
+  const Vector6d end_velocity = previous.twist + 0.5 * previous.acceleration;
+  const Vector6d acceleration = kAccelerationLasts * previous.acceleration;
+  prediction.motion.T_map_sensor =
+      previous.At(0.5) *
+      SE3::Exp(middle * end_velocity + 0.5 * middle * std::min(middle, 1.0) * acceleration);
+  prediction.motion.twist = length * (end_velocity + std::min(middle, 1.0) * acceleration);
+  prediction.motion.acceleration = length * length * acceleration;
+  prediction.sigma_scale = std::max(1.0, middle + 0.5);
+  return prediction;
+}
+
+PoseTable::PoseTable(const ScanMotion& motion, const Eigen::Matrix3d& rotation) {
+  const bool still = motion.twist.isZero(0.0) && motion.acceleration.isZero(0.0);
+  for (int k = 0; k <= kIntervals; ++k) {
+    if (still && k > 0) {
+      entries_[static_cast<std::size_t>(k)] = entries_[0];
+      continue;
+    }
+    const SE3 pose = motion.Within(static_cast<double>(k) / kIntervals - 0.5);
+    Entry& entry = entries_[static_cast<std::size_t>(k)];
+    entry.leftCols<3>() = (rotation * pose.RotationMatrix()).cast<float>();
+    entry.col(3) = (rotation * pose.Translation()).cast<float>();
+  }
+}
+
+std::vector<Eigen::Vector3f> Deskew(std::span<const Eigen::Vector3f> points,
+                                    std::span<const float> phase,
+                                    const ScanMotion& motion) {
+  COVSPLAT_CHECK(phase.empty() || phase.size() == points.size());
+  std::vector<Eigen::Vector3f> deskewed(points.begin(), points.end());
+  if (phase.empty()) return deskewed;
+  const PoseTable poses(motion, Eigen::Matrix3d::Identity());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const PoseTable::Pose pose = poses.At(phase[i]);
+    deskewed[i] = pose.rotation * points[i] + pose.translation;
+  }
+  return deskewed;
+}
+
+}  // namespace covsplat

@@ -1,0 +1,82 @@
+// The sensor's motion during one scan, and what follows from it: prediction and deskewing.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "covsplat/core/se3.hpp"
+#include "covsplat/registration/deskew.hpp"
+
+namespace covsplat {
+
+/// Motion of the sensor during one scan, second order in the phase s in [-0.5, 0.5]: at s the
+/// sensor is at `T_map_sensor * Exp(s * twist + s^2 / 2 * acceleration)`. Tangent vectors are in
+/// the sensor frame at mid scan, per scan duration and per duration squared.
+struct ScanMotion {
+  SE3 T_map_sensor;  ///< at mid scan
+  Vector6d twist = Vector6d::Zero();
+  Vector6d acceleration = Vector6d::Zero();
+
+  /// T_mid_s: maps what was measured at phase s to the sensor frame at mid scan.
+  SE3 Within(double phase) const {
+    return SE3::Exp(phase * twist + 0.5 * phase * phase * acceleration);
+  }
+  /// T_map_s.
+  SE3 At(double phase) const { return T_map_sensor * Within(phase); }
+  bool IsFinite() const {
+    return T_map_sensor.IsFinite() && twist.allFinite() && acceleration.allFinite();
+  }
+};
+
+/// A motion expected before looking at the scan.
+struct MotionPrediction {
+  ScanMotion motion;
+  /// Multiplies the standard deviations of the motion prior: 1 for a prediction from a scan that
+  /// was just tracked, more after a gap, 0 or less for "no idea" (the prior is switched off).
+  double sigma_scale = 1.0;
+};
+
+/// Continues a motion over `gap_s` from the middle of one scan to the middle of the next. Velocity
+/// is kept, acceleration fades: handheld motion has turned around within a few scans.
+MotionPrediction PredictMotion(const ScanMotion& previous,
+                               double previous_duration_s,
+                               double duration_s,
+                               double gap_s);
+
+/// `T_a * T_mid_s` in float for all phases of a scan: a table of poses, linear in between. At 256
+/// intervals the interpolation is within 1e-6 rad for turns below 0.7 rad per scan.
+class PoseTable {
+ public:
+  struct Pose {
+    Eigen::Matrix3f rotation;
+    Eigen::Vector3f translation;
+  };
+
+  /// Poses `rotation * T_mid_s`; pass the identity to deskew to mid scan.
+  PoseTable(const ScanMotion& motion, const Eigen::Matrix3d& rotation);
+
+  Pose At(float phase) const {
+    const float position = (phase + 0.5f) * static_cast<float>(kIntervals);
+    const float clamped = std::min(std::max(position, 0.0f), static_cast<float>(kIntervals) - 0.5f);
+    const auto index = static_cast<std::size_t>(clamped);
+    const float fraction = position - static_cast<float>(index);
+    const Entry entry = entries_[index] + fraction * (entries_[index + 1] - entries_[index]);
+    return {entry.leftCols<3>(), entry.col(3)};
+  }
+
+ private:
+  static constexpr int kIntervals = 256;
+  using Entry = Eigen::Matrix<float, 3, 4>;
+  std::array<Entry, kIntervals + 1> entries_;
+};
+
+/// Points brought from their own times to the sensor frame at mid scan. An empty `phase` means all
+/// points were measured at mid scan.
+std::vector<Eigen::Vector3f> Deskew(std::span<const Eigen::Vector3f> points,
+                                    std::span<const float> phase,
+                                    const ScanMotion& motion);
+
+}  // namespace covsplat

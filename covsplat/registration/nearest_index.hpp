@@ -1,0 +1,48 @@
+// NearestIndex: exact nearest neighbours among fixed points, by hashed grid cells.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "covsplat/registration/voxel_hash.hpp"
+
+namespace covsplat {
+
+/// Points are stored cell by cell; a *slot* is a point's place in that order. Results do not depend
+/// on the cell size: among equally near points the one with the lowest original index wins.
+class NearestIndex {
+ public:
+  struct Match {
+    int slot = -1;  ///< -1: nothing within the radius
+    float squared_distance = std::numeric_limits<float>::infinity();
+  };
+
+  /// `points` must be finite. `cell_m` of about the typical neighbour distance to twice that is
+  /// fastest.
+  NearestIndex(std::span<const Eigen::Vector3f> points, float cell_m);
+
+  std::size_t Size() const { return order_.size(); }
+  /// Original index of the point in a slot.
+  int IndexOf(int slot) const { return order_[static_cast<std::size_t>(slot)]; }
+
+  /// Nearest point with a squared distance below `max_squared`. A `hint`, a slot that is probably
+  /// near, makes it faster and changes nothing else.
+  Match Nearest(const Eigen::Vector3f& query, float max_squared, int hint = -1) const;
+
+ private:
+  void ScanCell(const Eigen::Vector3i& cell, const Eigen::Vector3f& query, Match& best) const;
+  void Consider(std::size_t slot, const Eigen::Vector3f& query, Match& best) const;
+
+  float cell_m_;
+  float cells_per_m_;
+  VoxelHash cells_;               // cell -> position in begin_
+  std::vector<int> begin_;        // [cells + 1], first slot of each cell
+  std::vector<int> order_;        // [N], slot -> original index
+  std::vector<float> x_, y_, z_;  // [N], by slot
+};
+
+}  // namespace covsplat

@@ -1,0 +1,93 @@
+#include "covsplat/registration/preprocess.hpp"
+
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+#include "covsplat/core/check.hpp"
+#include "covsplat/registration/symmetric_eigen.hpp"
+#include "covsplat/registration/voxel_moments.hpp"
+
+namespace covsplat {
+namespace {
+
+constexpr std::size_t kGrain = 1024;
+
+// Indices of the usable points; counts the others.
+std::vector<int> SelectUsable(const Scan& scan,
+                              const PreprocessConfig& config,
+                              SourceCloud& cloud) {
+  const auto min_squared = static_cast<float>(config.min_range_m * config.min_range_m);
+  const auto max_squared = static_cast<float>(config.max_range_m * config.max_range_m);
+  std::vector<int> usable;
+  usable.reserve(scan.points.size());
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const float squared = scan.points[i].squaredNorm();
+    if (squared > min_squared && squared < max_squared) {
+      usable.push_back(static_cast<int>(i));
+    } else if (std::isfinite(squared)) {
+      ++cloud.out_of_range;
+    } else {
+      ++cloud.not_finite;
+    }
+  }
+  return usable;
+}
+
+// Columns along descending variance with the last one facing the sensor at the origin.
+PointCovariance DescribeSurface(const Eigen::Matrix3d& covariance, const Eigen::Vector3d& point) {
+  SymmetricEigen eigen = DecomposeSymmetric(covariance);
+  if (eigen.vectors.col(2).dot(point) > 0.0) eigen.vectors.rightCols<2>() *= -1.0;
+  return {eigen.vectors.cast<float>(), eigen.values.cwiseMax(0.0).cwiseSqrt().cast<float>()};
+}
+
+}  // namespace
+
+SourceCloud Preprocess(const Scan& scan,
+                       const ScanTiming& timing,
+                       const ScanMotion& predicted,
+                       const PreprocessConfig& config,
+                       ThreadPool& pool) {
+  COVSPLAT_CHECK(timing.phase.empty() || timing.phase.size() == scan.points.size());
+  SourceCloud cloud;
+  cloud.duration_s = timing.duration_s;
+  cloud.scan_points = scan.points.size();
+  const std::vector<int> usable = SelectUsable(scan, config, cloud);
+
+  const auto phase_of = [&](int i) {
+    return timing.phase.empty() ? 0.0f : timing.phase[static_cast<std::size_t>(i)];
+  };
+  const PoseTable poses(timing.phase.empty() ? ScanMotion{} : predicted,
+                        Eigen::Matrix3d::Identity());
+  std::vector<Eigen::Vector3f> deskewed(usable.size());
+  ParallelFor(pool, usable.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const PoseTable::Pose pose = poses.At(phase_of(usable[k]));
+      deskewed[k] =
+          pose.rotation * scan.points[static_cast<std::size_t>(usable[k])] + pose.translation;
+    }
+  });
+
+  const VoxelMoments voxels(deskewed, static_cast<float>(config.downsample_voxel_m));
+  const std::size_t n = voxels.Size();
+  cloud.points.resize(n);
+  cloud.phase.resize(n);
+  cloud.scan_index.resize(n);
+  cloud.covariance.resize(n);
+  ParallelFor(pool, n, kGrain / 8, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      const int index = usable[static_cast<std::size_t>(voxels.Representative(v))];
+      cloud.scan_index[v] = index;
+      cloud.points[v] = scan.points[static_cast<std::size_t>(index)];
+      cloud.phase[v] = phase_of(index);
+      const Eigen::Matrix3d R =
+          poses.At(cloud.phase[v]).rotation.cast<double>();  // R_mid_s of this point
+      const Eigen::Matrix3d covariance = voxels.CovarianceAround(v, config.covariance_neighbours);
+      cloud.covariance[v] =
+          DescribeSurface(R.transpose() * covariance * R, cloud.points[v].cast<double>());
+    }
+  });
+  return cloud;
+}
+
+}  // namespace covsplat

@@ -1,0 +1,119 @@
+#include "covsplat/registration/target.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace covsplat {
+namespace {
+
+std::vector<int> SelectUsable(std::span<const TargetSurfel> surfels) {
+  std::vector<int> usable;
+  usable.reserve(surfels.size());
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    const TargetSurfel& s = surfels[i];
+    const float norm = s.rotation.coeffs().squaredNorm();
+    const bool finite = s.mean.allFinite() && std::isfinite(norm) && std::isfinite(s.scale0) &&
+                        std::isfinite(s.scale1) && std::isfinite(s.confidence);
+    if (finite && norm > 1e-12f) usable.push_back(static_cast<int>(i));
+  }
+  return usable;
+}
+
+std::vector<Eigen::Vector3f> Means(std::span<const TargetSurfel> surfels,
+                                   const std::vector<int>& usable) {
+  std::vector<Eigen::Vector3f> means;
+  means.reserve(usable.size());
+  for (const int i : usable) means.push_back(surfels[static_cast<std::size_t>(i)].mean);
+  return means;
+}
+
+RegistrationTarget::Record MakeRecord(const TargetSurfel& surfel, float planar_weight) {
+  Eigen::Matrix3f axes = surfel.rotation.normalized().toRotationMatrix();
+  float sigma0 = std::abs(surfel.scale0);
+  float sigma1 = std::abs(surfel.scale1);
+  if (sigma0 < sigma1) {
+    std::swap(sigma0, sigma1);
+    axes.col(0).swap(axes.col(1));
+  }
+  return {.mean = surfel.mean,
+          .normal = axes.col(2),
+          .covariance = SurfaceCovariance(axes, sigma0, sigma1),
+          .planar_weight = planar_weight,
+          .confidence = std::max(surfel.confidence, 0.0f)};
+}
+
+// Value below which a share of the values lies; reorders them.
+float Percentile(std::vector<float>& values, double share) {
+  const auto nth =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+}  // namespace
+
+Eigen::Matrix<float, 6, 1> SurfaceCovariance(const Eigen::Matrix3f& axes,
+                                             float sigma0,
+                                             float sigma1) {
+  constexpr float kThickness = 1e-3f;
+  constexpr float kMaxElongation = 100.0f;
+  const float ratio = sigma0 / std::max(sigma1, 1e-6f);
+  const float lambda0 = std::clamp(ratio * ratio, 1.0f, kMaxElongation);
+  const Eigen::Matrix3f c =
+      axes * Eigen::Vector3f(lambda0, 1.0f, kThickness).asDiagonal() * axes.transpose();
+  Eigen::Matrix<float, 6, 1> packed;
+  packed << c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2);
+  return packed;
+}
+
+std::vector<float> PlanarWeights(std::span<const Eigen::Vector2f> scales) {
+  constexpr float kEpsilon = 1e-3f;
+  constexpr float kMaxWeight = 10.0f;
+  std::vector<float> kappa;
+  kappa.reserve(scales.size());
+  for (const Eigen::Vector2f& s : scales) {
+    kappa.push_back(s.cwiseAbs().maxCoeff() / (s.cwiseAbs().minCoeff() + kEpsilon));
+  }
+  if (kappa.empty()) return kappa;
+  std::vector<float> sorted = kappa;
+  const float low = Percentile(sorted, 0.05);
+  const float span = Percentile(sorted, 0.95) - low;
+  for (float& value : kappa) {
+    const float normalised = span > kEpsilon ? std::clamp((value - low) / span, 0.0f, 1.0f) : 0.0f;
+    value = std::min(1.0f / (normalised + kEpsilon), kMaxWeight);
+  }
+  return kappa;
+}
+
+RegistrationTarget::RegistrationTarget(std::span<const TargetSurfel> surfels,
+                                       const Eigen::Vector3d& origin_map,
+                                       std::uint64_t revision,
+                                       double cell_m)
+    : RegistrationTarget(surfels, SelectUsable(surfels), origin_map, revision, cell_m) {}
+
+RegistrationTarget::RegistrationTarget(std::span<const TargetSurfel> surfels,
+                                       std::vector<int> usable,
+                                       const Eigen::Vector3d& origin_map,
+                                       std::uint64_t revision,
+                                       double cell_m)
+    : origin_map_(origin_map),
+      revision_(revision),
+      index_(Means(surfels, usable), static_cast<float>(cell_m)) {
+  std::vector<Eigen::Vector2f> scales;
+  scales.reserve(usable.size());
+  for (const int i : usable) {
+    const TargetSurfel& surfel = surfels[static_cast<std::size_t>(i)];
+    scales.emplace_back(surfel.scale0, surfel.scale1);
+  }
+  const std::vector<float> weights = PlanarWeights(scales);
+  surfel_.reserve(usable.size());
+  records_.reserve(usable.size());
+  for (std::size_t slot = 0; slot < usable.size(); ++slot) {
+    const auto k = static_cast<std::size_t>(index_.IndexOf(static_cast<int>(slot)));
+    surfel_.push_back(usable[k]);
+    records_.push_back(MakeRecord(surfels[static_cast<std::size_t>(usable[k])], weights[k]));
+  }
+}
+
+}  // namespace covsplat

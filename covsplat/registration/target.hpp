@@ -1,0 +1,81 @@
+// RegistrationTarget: the surfels that scans are registered to.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "covsplat/registration/nearest_index.hpp"
+
+namespace covsplat {
+
+/// A flat piece of surface: position, orientation, extent.
+struct TargetSurfel {
+  Eigen::Vector3f mean = Eigen::Vector3f::Zero();  ///< map frame, relative to the target's origin
+  /// R_map_surfel; its third axis is the normal. Need not be normalised.
+  Eigen::Quaternionf rotation = Eigen::Quaternionf::Identity();
+  float scale0 = 1.0f;      ///< standard deviation along the first axis, m
+  float scale1 = 1.0f;      ///< along the second; the order of the two does not matter
+  float confidence = 1.0f;  ///< factor on the matching weight
+};
+
+/// Immutable once built, so one target may serve several threads. Positions are float relative to
+/// `origin_map`, which keeps maps of kilometres precise. Surfels with values that are not finite or
+/// with a zero rotation are left out.
+class RegistrationTarget {
+ public:
+  /// What matching needs to know of a surfel; one cache line.
+  struct alignas(64) Record {
+    Eigen::Vector3f mean;
+    Eigen::Vector3f normal;
+    Eigen::Matrix<float, 6, 1> covariance;  ///< xx xy xz yy yz zz, middle eigenvalue 1
+    float planar_weight;                    ///< paper eq. 5
+    float confidence;
+  };
+
+  RegistrationTarget() : RegistrationTarget({}, Eigen::Vector3d::Zero(), 0) {}
+  RegistrationTarget(std::span<const TargetSurfel> surfels,
+                     const Eigen::Vector3d& origin_map,
+                     std::uint64_t revision,
+                     double cell_m = 0.5);
+
+  std::size_t Size() const { return records_.size(); }
+  const Eigen::Vector3d& OriginMap() const { return origin_map_; }
+  std::uint64_t Revision() const { return revision_; }
+  const NearestIndex& Index() const { return index_; }
+  /// Record in a slot of the index.
+  const Record& At(int slot) const { return records_[static_cast<std::size_t>(slot)]; }
+  /// Position of a slot's surfel in the span the target was built from.
+  int SurfelOf(int slot) const { return surfel_[static_cast<std::size_t>(slot)]; }
+
+ private:
+  RegistrationTarget(std::span<const TargetSurfel> surfels,
+                     std::vector<int> usable,
+                     const Eigen::Vector3d& origin_map,
+                     std::uint64_t revision,
+                     double cell_m);
+
+  Eigen::Vector3d origin_map_;
+  std::uint64_t revision_;
+  NearestIndex index_;
+  std::vector<int> surfel_;      // by slot
+  std::vector<Record> records_;  // by slot
+};
+
+/// Covariance of a surface for matching: `axes diag(lambda0, 1, eps) axes^T` with
+/// `lambda0 = clip((sigma0 / sigma1)^2, 1, 100)`; source and target share it. Packed as
+/// xx xy xz yy yz zz. `sigma0 >= sigma1`.
+Eigen::Matrix<float, 6, 1> SurfaceCovariance(const Eigen::Matrix3f& axes,
+                                             float sigma0,
+                                             float sigma1);
+
+/// Weights of paper eqs. 2, 3 and 5 from in-plane scales `[N x 2]` in any order: 10 for round
+/// surfels down to 1 for the most elongated. Curvature is normalised between its 5th and 95th
+/// percentile, so a single needle does not make all others look planar.
+std::vector<float> PlanarWeights(std::span<const Eigen::Vector2f> scales);
+
+}  // namespace covsplat
