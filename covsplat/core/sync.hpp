@@ -48,9 +48,10 @@ class BoundedQueue {
     not_full_.notify_all();
   }
 
-  std::size_t Size() const {
+  /// Closed and drained.
+  bool Closed() const {
     const std::scoped_lock lock(mutex_);
-    return items_.size();
+    return closed_ && items_.empty();
   }
 
  private:
@@ -78,6 +79,7 @@ class Latest {
     {
       const std::scoped_lock lock(mutex_);
       std::swap(value_, value);
+      published_.notify_all();
     }
     // The old value is freed here, outside the lock, unless a reader still holds it.
   }
@@ -87,8 +89,15 @@ class Latest {
     return value_;
   }
 
+  /// Waits until there is a value.
+  void WaitForFirst() const {
+    std::unique_lock lock(mutex_);
+    published_.wait(lock, [&] { return value_ != nullptr; });
+  }
+
  private:
   mutable std::mutex mutex_;
+  mutable std::condition_variable published_;
   std::shared_ptr<const T> value_;  // guarded by mutex_
 };
 

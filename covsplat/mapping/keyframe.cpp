@@ -1,0 +1,52 @@
+#include "covsplat/mapping/keyframe.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "covsplat/mapping/signals.hpp"
+#include "covsplat/registration/nearest_index.hpp"
+
+namespace covsplat {
+
+double Overlap(std::span<const float> squared_distance, double overlap_distance_m) {
+  if (squared_distance.empty()) return 0.0;
+  const auto limit = static_cast<float>(overlap_distance_m * overlap_distance_m);
+  const auto near = std::count_if(
+      squared_distance.begin(), squared_distance.end(), [&](float d2) { return d2 < limit; });
+  return static_cast<double>(near) / static_cast<double>(squared_distance.size());
+}
+
+Keyframe MakeKeyframe(TrackedScan tracked,
+                      const SensorModel& sensor,
+                      double max_surface_distance_m,
+                      ThreadPool& pool) {
+  RangeImage image = ProjectScan(sensor, tracked.points);
+  Keyframe keyframe{
+      std::move(tracked),
+      {std::move(image.range_m),
+       Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::Zero())},
+      std::move(image.point_index),
+      Image<int>(sensor.Rows(), sensor.Columns(), -1),
+      {}};
+  const TrackedScan& scan = keyframe.tracked;
+  keyframe.control_score = ControlScores(scan.covariance, scan.squared_distance);
+  const NearestIndex index(scan.surface, static_cast<float>(max_surface_distance_m));
+  const auto gate = static_cast<float>(max_surface_distance_m * max_surface_distance_m);
+  ParallelFor(pool, keyframe.point.Size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const int point = keyframe.point.Pixels()[i];
+      if (point < 0) continue;
+      const Eigen::Vector3f& p = scan.points[static_cast<std::size_t>(point)];
+      const NearestIndex::Match match = index.Nearest(p, gate);
+      if (match.slot < 0) continue;
+      const int surface = index.IndexOf(match.slot);
+      keyframe.surface.Pixels()[i] = surface;
+      const auto& axes = scan.covariance[static_cast<std::size_t>(surface)].axes;
+      const Eigen::Vector3f normal = axes.col(2);
+      keyframe.measurement.normal.Pixels()[i] = normal.dot(p) < 0.0f ? normal : -normal;
+    }
+  });
+  return keyframe;
+}
+
+}  // namespace covsplat

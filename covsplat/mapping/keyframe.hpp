@@ -1,0 +1,70 @@
+// Keyframe: a tracked scan as the map needs it.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "covsplat/core/config_field.hpp"
+#include "covsplat/core/range_image.hpp"
+#include "covsplat/registration/preprocess.hpp"
+#include "covsplat/splat/engine.hpp"
+
+namespace covsplat {
+
+/// A scan with its pose: everything that crosses from tracking to mapping. All vectors are in the
+/// sensor frame at mid scan.
+struct TrackedScan {
+  std::int64_t scan = 0;  ///< ordinal in the run
+  double stamp_s = 0.0;   ///< mid scan
+  SE3 T_map_sensor;
+  std::vector<Eigen::Vector3f> points;      ///< all usable points, deskewed, m
+  std::vector<Eigen::Vector3f> surface;     ///< [S] deskewed source points of the registration, m
+  std::vector<PointCovariance> covariance;  ///< [S] the surface around each
+  std::vector<float> squared_distance;      ///< [S] m^2 to the target, infinity where unmatched
+};
+
+/// A tracked scan on the sensor's image grid, with the surface each pixel lies on.
+struct Keyframe {
+  TrackedScan tracked;
+  RangeMeasurement measurement;
+  Image<int> point;                  ///< index into tracked.points, -1 where there is no return
+  Image<int> surface;                ///< index into tracked.surface, -1 where it is unknown
+  std::vector<float> control_score;  ///< [S] c, NaN where unknown
+};
+
+struct KeyframeConfig {
+  double max_distance_m = 1.0;
+  double max_angle_deg = 20.0;
+  double min_overlap = 0.8;
+  double overlap_distance_m = 0.3;
+  int max_scans = 20;
+
+  template <class Self, class V>
+  static void Visit(Self& c, V&& v) {
+    v.Field(
+        "max_distance_m", c.max_distance_m, Range{0.01, 100.0}, "a keyframe after moving this far");
+    v.Field("max_angle_deg", c.max_angle_deg, Range{1.0, 360.0}, "... or turning this much");
+    v.Field("min_overlap",
+            c.min_overlap,
+            Range{0.0, 1.0},
+            "... or when less than this share of the scan is near the map");
+    v.Field("overlap_distance_m",
+            c.overlap_distance_m,
+            Range{0.01, 10.0},
+            "nearer than this to a Gaussian's mean counts as overlap");
+    v.Field("max_scans", c.max_scans, Range{1, 100000}, "... or after so many scans");
+  }
+};
+
+/// Share of the source points that lie on the map.
+double Overlap(std::span<const float> squared_distance, double overlap_distance_m);
+
+/// Projects a tracked scan and gives every pixel the surface (and so the normal) of the source
+/// point next to it, if there is one within `max_surface_distance_m`.
+Keyframe MakeKeyframe(TrackedScan tracked,
+                      const SensorModel& sensor,
+                      double max_surface_distance_m,
+                      ThreadPool& pool);
+
+}  // namespace covsplat

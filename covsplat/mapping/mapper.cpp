@@ -1,0 +1,83 @@
+#include "covsplat/mapping/mapper.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace covsplat {
+namespace {
+
+constexpr std::size_t kNearKeyframes = 8;
+
+}  // namespace
+
+Mapper::Mapper(std::unique_ptr<SplatEngine> engine,
+               const SensorModel& sensor,
+               const MapperConfig& config)
+    : sensor_(sensor), config_(config), map_(std::move(engine)) {}
+
+void Mapper::Insert(const Keyframe& keyframe) {
+  const ScopedTimer timer(times_, "insert");
+  std::optional<RenderOutput> render;
+  if (map_.Keyframes() > 0) render = Render(keyframe.tracked.T_map_sensor);
+  const SpawnedGaussians spawned =
+      SpawnGaussians(keyframe, render ? &*render : nullptr, sensor_, config_.spawn);
+  const int number = map_.AddKeyframe(keyframe, spawned);
+  map_.MarkSeen(number, keyframe, sensor_);
+  if (map_.Keyframes() % config_.prune_interval == 0) map_.PruneOpacity(config_.prune_opacity);
+}
+
+void Mapper::Visit(int keyframe, int steps) {
+  if (!config_.enabled) return;
+  const ScopedTimer timer(times_, "optimize");
+  for (int i = 0; i < steps; ++i) {
+    const bool surface_normals = steps_ >= config_.engine.loss.surface_normal_start;
+    map_.Engine().Step(keyframe, surface_normals);
+    ++steps_;
+  }
+}
+
+void Mapper::OptimizeNewest() {
+  if (map_.Keyframes() == 0) return;
+  const ScheduleConfig& schedule = config_.schedule;
+  Visit(map_.Keyframes() - 1, schedule.steps_new);
+  Visit(RandomNearKeyframe(), schedule.steps_near);
+  Visit(static_cast<int>(rng_.Below(static_cast<std::uint64_t>(map_.Keyframes()))),
+        schedule.steps_old);
+}
+
+void Mapper::OptimizeIdle() {
+  if (map_.Keyframes() == 0) return;
+  const auto all = static_cast<std::uint64_t>(map_.Keyframes());
+  const bool near = rng_.Uniform() < 0.5;
+  Visit(near ? RandomNearKeyframe() : static_cast<int>(rng_.Below(all)),
+        config_.schedule.steps_per_visit);
+}
+
+void Mapper::OptimizeFinally() {
+  if (map_.Keyframes() == 0) return;
+  const auto all = static_cast<std::uint64_t>(map_.Keyframes());
+  for (int left = config_.schedule.final_steps; left > 0;
+       left -= config_.schedule.steps_per_visit) {
+    Visit(static_cast<int>(rng_.Below(all)), std::min(left, config_.schedule.steps_per_visit));
+  }
+}
+
+int Mapper::RandomNearKeyframe() {
+  const Eigen::Vector3d here = map_.KeyframePose(map_.Keyframes() - 1).Translation();
+  std::vector<std::pair<double, int>> by_distance;
+  for (int k = 0; k < map_.Keyframes(); ++k) {
+    by_distance.emplace_back((map_.KeyframePose(k).Translation() - here).norm(), k);
+  }
+  const std::size_t near = std::min(by_distance.size(), kNearKeyframes);
+  std::partial_sort(by_distance.begin(),
+                    by_distance.begin() + static_cast<std::ptrdiff_t>(near),
+                    by_distance.end());
+  return by_distance[rng_.Below(near)].second;
+}
+
+std::shared_ptr<const RegistrationTarget> Mapper::MakeTarget(const SE3& T_map_sensor) {
+  const ScopedTimer timer(times_, "target");
+  return BuildTarget(map_, T_map_sensor, 1.2 * sensor_.MaxRange(), ++revision_, config_.trackable);
+}
+
+}  // namespace covsplat

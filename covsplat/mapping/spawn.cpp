@@ -1,0 +1,140 @@
+#include "covsplat/mapping/spawn.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "covsplat/registration/voxel_hash.hpp"
+
+namespace covsplat {
+namespace {
+
+/// Below this the surface is seen so flat that its sampling says little about its extent.
+constexpr double kMinIncidence = 0.3;
+/// A Gaussian is no wider than this many standard deviations of the surface around it.
+constexpr double kSurfaceSigmas = 1.5;
+
+struct Site {
+  int row = 0;
+  int column = 0;
+};
+
+bool IsExplained(const Keyframe& keyframe,
+                 const RenderOutput* render,
+                 Site site,
+                 const SpawnConfig& config) {
+  if (render == nullptr) return false;
+  const double measured = keyframe.measurement.range_m(site.row, site.column);
+  const double rendered = render->range_m(site.row, site.column);
+  const double tolerance = config.range_tolerance_m + config.range_tolerance_ratio * measured;
+  return render->alpha(site.row, site.column) >= config.max_alpha &&
+         std::abs(rendered - measured) <= tolerance;
+}
+
+/// Unexplained pixels on a known surface, at most one per voxel.
+std::vector<Site> ChooseSites(const Keyframe& keyframe,
+                              const RenderOutput* render,
+                              const SpawnConfig& config) {
+  std::vector<Site> sites;
+  VoxelHash taken(keyframe.point.Size());
+  for (int row = 0; row < keyframe.point.Rows(); ++row) {
+    for (int column = 0; column < keyframe.point.Columns(); ++column) {
+      if (keyframe.surface(row, column) < 0) continue;
+      if (IsExplained(keyframe, render, {row, column}, config)) continue;
+      const auto point = static_cast<std::size_t>(keyframe.point(row, column));
+      const Eigen::Vector3f& p = keyframe.tracked.points[point];
+      const int fresh = static_cast<int>(sites.size());
+      const Eigen::Vector3i cell = CellOf(p / static_cast<float>(config.voxel_m));
+      if (taken.FindOrInsert(cell, fresh) == fresh) sites.push_back({row, column});
+    }
+  }
+  return sites;
+}
+
+/// Distance of neighbouring measurements on a surface, across the beams.
+double SamplingDistance(const SensorModel& sensor, int row, double range, double cosine) {
+  const std::vector<double>& elevation = sensor.Elevations();
+  const auto upper = static_cast<std::size_t>(std::min(row, sensor.Rows() - 2));
+  const double between_beams = elevation[upper] - elevation[upper + 1];
+  const double between_columns = 2.0 * std::numbers::pi / sensor.Columns();
+  return range * std::max(between_beams, between_columns) / std::max(cosine, kMinIncidence);
+}
+
+Eigen::Vector2d InitialScales(const SpawnConfig& config,
+                              const Eigen::Vector3f& sigma,
+                              double range,
+                              double sampling_m) {
+  Eigen::Vector2d scales;
+  for (int k = 0; k < 2; ++k) {
+    const double spread = sigma[k];
+    // Paper eq. 6, or half way to the neighbours but not beyond the surface itself.
+    const double wanted =
+        config.scale_rule == ScaleRule::kPaper
+            ? config.kappa * std::max(range, 1.0) * spread
+            : std::min(config.spacing_factor * std::max(config.voxel_m, sampling_m),
+                       kSurfaceSigmas * spread);
+    scales[k] = std::clamp(wanted, config.min_scale_m, config.max_scale_m);
+  }
+  return scales;
+}
+
+void WriteGaussian(GaussianColumns<float>& table,
+                   std::size_t i,
+                   const Eigen::Vector3f& mean,
+                   const Eigen::Matrix3f& axes,
+                   const Eigen::Vector2d& scales,
+                   double opacity) {
+  const Eigen::Quaternionf q = Eigen::Quaternionf(axes).normalized();
+  for (int k = 0; k < 3; ++k) table.Column(kMeanX + k)[i] = mean[k];
+  table.Column(kQuatW)[i] = q.w();
+  for (int k = 0; k < 3; ++k) table.Column(kQuatX + k)[i] = q.vec()[k];
+  table.Column(kLogScaleU)[i] = static_cast<float>(std::log(scales[0]));
+  table.Column(kLogScaleV)[i] = static_cast<float>(std::log(scales[1]));
+  table.Column(kOpacityLogit)[i] = static_cast<float>(std::log(opacity / (1.0 - opacity)));
+}
+
+/// The axes of a surface with the normal turned to face the sensor from `point`.
+Eigen::Matrix3f FacingAxes(const Eigen::Matrix3f& axes, const Eigen::Vector3f& point) {
+  Eigen::Matrix3f facing = axes;
+  if (facing.col(2).dot(point) > 0.0f) {
+    facing.col(1) *= -1.0f;
+    facing.col(2) *= -1.0f;
+  }
+  return facing;
+}
+
+}  // namespace
+
+SpawnedGaussians SpawnGaussians(const Keyframe& keyframe,
+                                const RenderOutput* render,
+                                const SensorModel& sensor,
+                                const SpawnConfig& config) {
+  const std::vector<Site> sites = ChooseSites(keyframe, render, config);
+  SpawnedGaussians spawned;
+  spawned.gaussians.Resize(sites.size());
+  for (std::size_t i = 0; i < sites.size(); ++i) {
+    const auto [row, column] = sites[i];
+    const auto point = static_cast<std::size_t>(keyframe.point(row, column));
+    const auto surface = static_cast<std::size_t>(keyframe.surface(row, column));
+    const Eigen::Vector3f& mean = keyframe.tracked.points[point];
+    const PointCovariance& covariance = keyframe.tracked.covariance[surface];
+    const double range = mean.norm();
+    const double cosine = std::abs(covariance.axes.col(2).dot(mean.normalized()));
+    const double u = PhysicalConfidence(range, cosine, config.confidence);
+    // Paper eq. 8.
+    const double opacity = config.min_opacity + (config.max_opacity - config.min_opacity) * u;
+    const double sampling_m = SamplingDistance(sensor, row, range, cosine);
+    WriteGaussian(spawned.gaussians,
+                  i,
+                  mean,
+                  FacingAxes(covariance.axes, mean),
+                  InitialScales(config, covariance.sigma_m, range, sampling_m),
+                  opacity);
+    spawned.confidence.push_back(static_cast<float>(u));
+    spawned.control_score.push_back(keyframe.control_score[surface]);
+  }
+  return spawned;
+}
+
+}  // namespace covsplat

@@ -1,0 +1,81 @@
+// Spawning: the part of a keyframe that the map does not explain becomes new Gaussians. One of the
+// two places where tracking and mapping meet: covariances in, Gaussians out.
+#pragma once
+
+#include <optional>
+
+#include "covsplat/mapping/keyframe.hpp"
+#include "covsplat/mapping/signals.hpp"
+
+namespace covsplat {
+
+/// How large a new Gaussian is.
+enum class ScaleRule {
+  kSpacing,  ///< half the distance to its neighbours: the sampling of the scan, or the spawn voxel
+  kPaper,    ///< kappa * range * sigma of the local covariance (paper eq. 6)
+};
+
+template <>
+struct EnumNames<ScaleRule> {
+  static constexpr std::array<EnumName<ScaleRule>, 2> kNames{
+      {{ScaleRule::kSpacing, "spacing"}, {ScaleRule::kPaper, "paper"}}};
+};
+
+struct SpawnConfig {
+  double voxel_m = 0.2;
+  double max_alpha = 0.5;
+  double range_tolerance_m = 0.1;
+  double range_tolerance_ratio = 0.01;
+  ScaleRule scale_rule = ScaleRule::kSpacing;
+  double spacing_factor = 0.5;
+  double kappa = 0.1;
+  double min_scale_m = 0.02;
+  double max_scale_m = 0.5;
+  double min_opacity = 0.1;
+  double max_opacity = 0.9;
+  ConfidenceConfig confidence;
+
+  template <class Self, class V>
+  static void Visit(Self& c, V&& v) {
+    v.Field(
+        "voxel_m", c.voxel_m, Range{0.02, 5.0}, "at most one new Gaussian per cube of this size");
+    v.Field("max_alpha",
+            c.max_alpha,
+            Range{0.0, 1.0},
+            "pixels rendered less opaque than this are not explained by the map");
+    v.Field("range_tolerance_m",
+            c.range_tolerance_m,
+            Range{0.0, 10.0},
+            "nor are pixels whose range is off by more than this ...");
+    v.Field("range_tolerance_ratio",
+            c.range_tolerance_ratio,
+            Range{0.0, 1.0},
+            "... plus this share of the range");
+    v.Field("scale_rule", c.scale_rule, "size of new Gaussians");
+    v.Field("spacing_factor",
+            c.spacing_factor,
+            Range{0.05, 5.0},
+            "spacing rule: scale in units of the distance to the neighbours");
+    v.Field("kappa", c.kappa, Range{1e-3, 10.0}, "paper rule: kappa");
+    v.Field("min_scale_m", c.min_scale_m, Range{1e-3, 1.0}, "smallest initial scale");
+    v.Field("max_scale_m", c.max_scale_m, Range{0.01, 10.0}, "s_max: largest initial scale");
+    v.Field("min_opacity", c.min_opacity, Range{0.001, 0.999}, "initial opacity at confidence 0");
+    v.Field("max_opacity", c.max_opacity, Range{0.001, 0.999}, "initial opacity at confidence 1");
+    v.Section("confidence", c.confidence, "physical confidence u");
+  }
+};
+
+/// New Gaussians in the keyframe's frame with the signals that come from tracking.
+struct SpawnedGaussians {
+  GaussianColumns<float> gaussians;
+  std::vector<float> confidence;     ///< [N] u
+  std::vector<float> control_score;  ///< [N] c, NaN where unknown
+};
+
+/// `render`: the map from the keyframe's pose; nothing for the first keyframe.
+SpawnedGaussians SpawnGaussians(const Keyframe& keyframe,
+                                const RenderOutput* render,
+                                const SensorModel& sensor,
+                                const SpawnConfig& config);
+
+}  // namespace covsplat

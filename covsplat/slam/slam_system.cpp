@@ -1,0 +1,178 @@
+#include "covsplat/slam/slam_system.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace covsplat {
+namespace {
+
+/// The tracker waits for the mapper when this many keyframes are on their way.
+constexpr std::size_t kKeyframeQueue = 3;
+constexpr std::size_t kMaxHeldOut = 40;
+/// Idle visits of the mapper between two targets.
+constexpr int kVisitsPerTarget = 3;
+
+void AddTimes(StageTimes& to, const StageTimes& from) {
+  for (const auto& [stage, ms] : from.Stages()) to.Add(stage, ms);
+}
+
+ScanRecord MakeRecord(const TrackResult& result) {
+  ScanRecord record;
+  record.scan = result.tracked.scan;
+  record.stamp_s = result.tracked.stamp_s;
+  record.T_map_sensor = result.tracked.T_map_sensor;
+  record.state = result.state;
+  record.is_keyframe = result.is_keyframe;
+  record.points = result.points;
+  record.not_finite = result.not_finite;
+  record.out_of_range = result.out_of_range;
+  record.has_time = result.has_time;
+  record.source_points = result.tracked.surface.size();
+  record.correspondences = result.align.correspondences;
+  record.inlier_ratio = result.align.inlier_ratio;
+  record.overlap = result.overlap;
+  record.rms_residual_m = result.align.rms_residual_m;
+  record.iterations = result.align.iterations;
+  record.degenerate_directions = result.align.degenerate_directions;
+  record.times = result.times;
+  return record;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SlamSystem>> SlamSystem::Create(const SlamConfig& config,
+                                                       const SensorModel& sensor) {
+  const int all = config.system.threads > 0
+                      ? config.system.threads
+                      : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  const bool lockstep = config.system.schedule == Schedule::kLockstep;
+  const int mapping = lockstep ? all : std::max(1, all / 2);
+  const int tracking = lockstep ? all : std::max(1, all - mapping);
+  auto track_pool = std::make_unique<ThreadPool>(tracking);
+  auto map_pool = std::make_unique<ThreadPool>(mapping);
+  auto engine = MakeSplatEngine(config.system.backend, sensor, config.mapper.engine, *map_pool);
+  if (!engine) return Forward(engine);
+  return std::unique_ptr<SlamSystem>(new SlamSystem(
+      config, sensor, std::move(track_pool), std::move(map_pool), std::move(*engine)));
+}
+
+SlamSystem::SlamSystem(const SlamConfig& config,
+                       const SensorModel& sensor,
+                       std::unique_ptr<ThreadPool> track_pool,
+                       std::unique_ptr<ThreadPool> map_pool,
+                       std::unique_ptr<SplatEngine> engine)
+    : config_(config),
+      sensor_(sensor),
+      track_pool_(std::move(track_pool)),
+      map_pool_(std::move(map_pool)),
+      tracker_(config.tracker, *track_pool_),
+      held_out_stride_(config.system.held_out_interval),
+      mapper_(std::move(engine), sensor, config.mapper),
+      keyframes_(kKeyframeQueue) {
+  if (config_.system.schedule == Schedule::kThreaded) {
+    mapper_thread_ = std::jthread([this] { MapperLoop(); });
+  }
+}
+
+SlamSystem::~SlamSystem() { keyframes_.Close(); }
+
+std::optional<ScanRecord> SlamSystem::Process(const Scan& scan) {
+  const auto start = std::chrono::steady_clock::now();
+  const std::shared_ptr<const RegistrationTarget> target = target_.Get();
+  std::optional<TrackResult> result =
+      given_poses_ ? tracker_.Follow(scan, *given_poses_, target.get())
+                   : std::optional<TrackResult>(tracker_.Track(scan, target.get()));
+  if (!result) return std::nullopt;
+  const std::chrono::duration<double, std::milli> elapsed =
+      std::chrono::steady_clock::now() - start;
+
+  ScanRecord record = MakeRecord(*result);
+  record.track_ms = elapsed.count();
+  record.target_surfels = target ? target->Size() : 0;
+  if (result->first) HandOver(std::move(*result->first), &record.times);
+  if (!result->is_keyframe) MaybeHoldOut(*result);
+  if (result->is_keyframe) HandOver(std::move(result->tracked), &record.times);
+  record.gaussians = gaussians_;
+  record.mapper_steps = mapper_steps_;
+  ++scans_;
+  return record;
+}
+
+void SlamSystem::HandOver(TrackedScan keyframe, StageTimes* times) {
+  keyframe_scans_.push_back(keyframe.scan);
+  if (config_.system.schedule == Schedule::kLockstep) {
+    MapKeyframe(std::move(keyframe), *times);
+    return;
+  }
+  const ScopedTimer timer(*times, "wait");
+  keyframes_.Push(std::move(keyframe));
+  target_.WaitForFirst();  // without any map there is nothing to track the next scan against
+}
+
+// One keyframe's way through the mapper; the target is published as soon as it holds the keyframe,
+// and again once it has been optimised.
+void SlamSystem::MapKeyframe(TrackedScan tracked, StageTimes& times) {
+  {
+    const ScopedTimer timer(times, "keyframe");
+    T_map_newest_ = tracked.T_map_sensor;
+    const Keyframe keyframe = MakeKeyframe(
+        std::move(tracked), sensor_, config_.system.max_surface_distance_m, *map_pool_);
+    mapper_.Insert(keyframe);
+  }
+  if (config_.system.schedule == Schedule::kThreaded) PublishTarget();
+  mapper_.OptimizeNewest();
+  PublishTarget();
+  AddTimes(times, mapper_.TakeTimes());
+}
+
+void SlamSystem::PublishTarget() {
+  target_.Publish(mapper_.MakeTarget(T_map_newest_));
+  gaussians_ = mapper_.Map().Size();
+  mapper_steps_ = mapper_.Steps();
+}
+
+void SlamSystem::MapperLoop() {
+  int idle_visits = 0;
+  while (true) {
+    std::optional<TrackedScan> keyframe = config_.mapper.enabled && mapper_.Map().Keyframes() > 0
+                                              ? keyframes_.TryPop()
+                                              : keyframes_.Pop();
+    if (keyframe) {
+      MapKeyframe(std::move(*keyframe), mapper_times_);
+      continue;
+    }
+    if (keyframes_.Closed()) return;
+    mapper_.OptimizeIdle();
+    if (++idle_visits % kVisitsPerTarget == 0) PublishTarget();
+    AddTimes(mapper_times_, mapper_.TakeTimes());
+  }
+}
+
+void SlamSystem::MaybeHoldOut(const TrackResult& result) {
+  if (held_out_stride_ == 0 || result.state != TrackState::kTracking) return;
+  if (scans_ % held_out_stride_ != 0) return;
+  held_out_.push_back({result.tracked.scan,
+                       result.tracked.T_map_sensor,
+                       ProjectScan(sensor_, result.tracked.points).range_m});
+  if (held_out_.size() < kMaxHeldOut) return;
+  // Long runs: keep every other one and take half as many from now on.
+  std::vector<HeldOut> thinned;
+  for (std::size_t i = 0; i < held_out_.size(); i += 2) thinned.push_back(std::move(held_out_[i]));
+  held_out_ = std::move(thinned);
+  held_out_stride_ *= 2;
+}
+
+void SlamSystem::Finish() {
+  if (std::exchange(finished_, true)) return;
+  if (std::optional<TrackedScan> only = tracker_.TakePendingFirst()) {
+    HandOver(std::move(*only), &mapper_times_);
+  }
+  keyframes_.Close();
+  if (mapper_thread_.joinable()) mapper_thread_.join();
+  mapper_.OptimizeFinally();
+  AddTimes(mapper_times_, mapper_.TakeTimes());
+  gaussians_ = mapper_.Map().Size();
+  mapper_steps_ = mapper_.Steps();
+}
+
+}  // namespace covsplat

@@ -1,0 +1,234 @@
+#include "covsplat/slam/tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+namespace covsplat {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr int kBootstrapRounds = 3;
+constexpr double kMaxPoseGapS = 0.5;
+
+/// A deskewed source cloud as the target of the next scan, while there are no Gaussians.
+RegistrationTarget TargetOf(const SourceCloud& source, const ScanMotion& motion) {
+  const std::vector<Eigen::Vector3f> points = Deskew(source.points, source.phase, motion);
+  std::vector<TargetSurfel> surfels(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const PointCovariance& covariance = source.covariance[i];
+    surfels[i].mean = points[i];
+    surfels[i].rotation = Eigen::Quaternionf(covariance.axes);
+    surfels[i].scale0 = covariance.sigma_m[0];
+    surfels[i].scale1 = covariance.sigma_m[1];
+  }
+  return {surfels, Eigen::Vector3d::Zero(), 0};
+}
+
+/// The motion within a scan if the sensor went on evenly from one mid-scan pose to the next.
+Vector6d TwistBetween(const SE3& T_from, const SE3& T_to, double gap_s, double duration_s) {
+  if (gap_s <= 0.0 || duration_s <= 0.0) return Vector6d::Zero();
+  return (T_from.Inverse() * T_to).Log() * (duration_s / gap_s);
+}
+
+}  // namespace
+
+Tracker::Tracker(const TrackerConfig& config, ThreadPool& pool) : config_(config), pool_(pool) {}
+
+TrackResult Tracker::Track(const Scan& scan, const RegistrationTarget* target) {
+  TrackResult result;
+  const ScanTiming timing = TimeScan(scan, config_.deskew);
+  const MotionPrediction prediction = Predict(timing);
+  const Prepared prepared = Prepare(scan, timing, prediction.motion, result);
+  const double gap_s = timing.mid_stamp_s - last_stamp_s_;
+
+  if (!has_motion_ && !first_) {
+    if (prepared.source.Size() > 0) first_ = FirstScan{scan, prepared};
+    result.tracked = Deskewed(scan, prepared, {}, {});
+    last_stamp_s_ = timing.mid_stamp_s;
+    last_duration_s_ = timing.duration_s;
+    return result;
+  }
+  {
+    const ScopedTimer timer(result.times, "align");
+    if (first_) {
+      result.align = Bootstrap(prepared, result);
+    } else if (target != nullptr) {
+      result.align = Register(prepared.source, *target, prediction, gap_s);
+    }
+  }
+  const bool tracked = IsPlausible(result.align, gap_s);
+  result.state = tracked ? TrackState::kTracking : TrackState::kLost;
+  Conclude(scan, prepared, tracked ? result.align.motion : prediction.motion, result);
+  return result;
+}
+
+std::optional<TrackResult> Tracker::Follow(const Scan& scan,
+                                           const Trajectory& poses,
+                                           const RegistrationTarget* target) {
+  TrackResult result;
+  const ScanTiming timing = TimeScan(scan, config_.deskew);
+  const std::optional<SE3> middle = PoseAt(poses, timing.mid_stamp_s, kMaxPoseGapS);
+  if (!middle) return std::nullopt;
+  ScanMotion motion;
+  motion.T_map_sensor = *middle;
+  const double half_s = 0.5 * timing.duration_s;
+  const auto begin = PoseAt(poses, timing.mid_stamp_s - half_s, kMaxPoseGapS);
+  const auto end = PoseAt(poses, timing.mid_stamp_s + half_s, kMaxPoseGapS);
+  if (begin && end) motion.twist = (begin->Inverse() * *end).Log();
+  const Prepared prepared = Prepare(scan, timing, motion, result);
+  result.state = TrackState::kTracking;
+  result.align.motion = motion;
+  result.align.converged = true;
+  if (target != nullptr && target->Size() > 0) {
+    const auto gate = static_cast<float>(config_.gicp.max_correspondence_m);
+    for (const Eigen::Vector3f& p : Deskew(prepared.source.points, prepared.source.phase, motion)) {
+      const Eigen::Vector3d p_map = motion.T_map_sensor * p.cast<double>();
+      const auto match =
+          target->Index().Nearest((p_map - target->OriginMap()).cast<float>(), gate * gate);
+      result.align.squared_distance.push_back(match.squared_distance);
+    }
+  }
+  Conclude(scan, prepared, motion, result);
+  return result;
+}
+
+Tracker::Prepared Tracker::Prepare(const Scan& scan,
+                                   const ScanTiming& timing,
+                                   const ScanMotion& predicted,
+                                   TrackResult& result) {
+  const ScopedTimer timer(result.times, "preprocess");
+  Prepared prepared{timing, Preprocess(scan, timing, predicted, config_.preprocess, pool_)};
+  result.points = scan.points.size();
+  result.not_finite = prepared.source.not_finite;
+  result.out_of_range = prepared.source.out_of_range;
+  result.has_time = !timing.phase.empty();
+  return prepared;
+}
+
+MotionPrediction Tracker::Predict(const ScanTiming& timing) const {
+  if (!has_motion_) return {};
+  return PredictMotion(
+      motion_, last_duration_s_, timing.duration_s, timing.mid_stamp_s - last_stamp_s_);
+}
+
+// Until a map exists the first scan is the target. How it moved is only known once the second is
+// registered to it, so the two take turns.
+AlignResult Tracker::Bootstrap(const Prepared& second, TrackResult& result) {
+  const double gap_s = second.timing.mid_stamp_s - first_->prepared.timing.mid_stamp_s;
+  ScanMotion first_motion;
+  AlignResult align;
+  MotionPrediction prediction;
+  prediction.sigma_scale = 0.0;
+  for (int round = 0; round < kBootstrapRounds; ++round) {
+    const RegistrationTarget target = TargetOf(first_->prepared.source, first_motion);
+    align = Align(second.source, target, prediction, config_.gicp, pool_);
+    if (!IsPlausible(align, gap_s)) break;
+    prediction.motion = align.motion;
+    first_motion.twist =
+        TwistBetween(SE3(), align.motion.T_map_sensor, gap_s, first_->prepared.timing.duration_s);
+  }
+  if (!IsPlausible(align, gap_s)) first_motion = {};
+  TrackResult again;
+  const Prepared refined = Prepare(first_->scan, first_->prepared.timing, first_motion, again);
+  result.first = Deskewed(first_->scan, refined, first_motion, {});
+  T_map_keyframe_ = SE3();
+  scans_since_keyframe_ = 0;
+  first_.reset();
+  return align;
+}
+
+AlignResult Tracker::Register(const SourceCloud& source,
+                              const RegistrationTarget& target,
+                              const MotionPrediction& prediction,
+                              double gap_s) {
+  AlignResult align = Align(source, target, prediction, config_.gicp, pool_);
+  if (IsPlausible(align, gap_s)) return align;
+  MotionPrediction standstill;
+  standstill.motion.T_map_sensor = motion_.T_map_sensor;
+  standstill.sigma_scale = 0.0;
+  GicpConfig wide = config_.gicp;
+  wide.max_correspondence_m *= config_.recovery.retry_gate_factor;
+  AlignResult retried = Align(source, target, standstill, wide, pool_);
+  return IsPlausible(retried, gap_s) ? retried : align;
+}
+
+bool Tracker::IsPlausible(const AlignResult& align, double gap_s) const {
+  const RecoveryConfig& limits = config_.recovery;
+  if (align.correspondences == 0 || !align.motion.IsFinite()) return false;
+  if (align.inlier_ratio < limits.min_inlier_ratio) return false;
+  const Vector6d moved = (motion_.T_map_sensor.Inverse() * align.motion.T_map_sensor).Log();
+  return moved.tail<3>().norm() <= limits.max_speed_mps * gap_s &&
+         moved.head<3>().norm() <= limits.max_turn_rate_degps * kDegree * gap_s;
+}
+
+TrackedScan Tracker::Deskewed(const Scan& scan,
+                              const Prepared& prepared,
+                              const ScanMotion& motion,
+                              std::vector<float> squared_distance) const {
+  TrackedScan tracked;
+  tracked.scan = scan.index;
+  tracked.stamp_s = prepared.timing.mid_stamp_s;
+  tracked.T_map_sensor = motion.T_map_sensor;
+  tracked.points = Deskew(scan.points, prepared.timing.phase, motion);
+  tracked.surface = Deskew(prepared.source.points, prepared.source.phase, motion);
+  tracked.covariance = prepared.source.covariance;
+  if (prepared.timing.phase.empty()) {
+    tracked.squared_distance = std::move(squared_distance);
+    return tracked;
+  }
+  for (std::size_t i = 0; i < tracked.covariance.size(); ++i) {
+    const Eigen::Matrix3f turn =
+        motion.Within(prepared.source.phase[i]).RotationMatrix().cast<float>();
+    tracked.covariance[i].axes = turn * tracked.covariance[i].axes;
+  }
+  tracked.squared_distance = std::move(squared_distance);
+  return tracked;
+}
+
+// The only place where the tracker's state changes after a scan.
+void Tracker::Conclude(const Scan& scan,
+                       const Prepared& prepared,
+                       const ScanMotion& motion,
+                       TrackResult& result) {
+  const ScopedTimer timer(result.times, "deskew");
+  result.tracked = Deskewed(scan, prepared, motion, result.align.squared_distance);
+  result.overlap = Overlap(result.align.squared_distance, config_.keyframe.overlap_distance_m);
+  motion_ = motion;
+  has_motion_ = true;
+  last_stamp_s_ = prepared.timing.mid_stamp_s;
+  last_duration_s_ = prepared.timing.duration_s;
+  ++scans_since_keyframe_;
+  if (result.state == TrackState::kLost) {
+    ++scans_lost_;
+    motion_.twist *= 0.5;  // a blind prediction is trusted less with every scan
+    motion_.acceleration.setZero();
+    return;
+  }
+  scans_lost_ = 0;
+  result.is_keyframe = WantsKeyframe(motion.T_map_sensor, result.overlap);
+  if (result.is_keyframe) {
+    T_map_keyframe_ = motion.T_map_sensor;
+    scans_since_keyframe_ = 0;
+  }
+}
+
+bool Tracker::WantsKeyframe(const SE3& T_map_sensor, double overlap) const {
+  if (!T_map_keyframe_) return true;
+  const KeyframeConfig& policy = config_.keyframe;
+  const Vector6d moved = (T_map_keyframe_->Inverse() * T_map_sensor).Log();
+  return moved.tail<3>().norm() > policy.max_distance_m ||
+         moved.head<3>().norm() > policy.max_angle_deg * kDegree || overlap < policy.min_overlap ||
+         scans_since_keyframe_ >= policy.max_scans;
+}
+
+std::optional<TrackedScan> Tracker::TakePendingFirst() {
+  if (!first_) return std::nullopt;
+  TrackedScan tracked = Deskewed(first_->scan, first_->prepared, {}, {});
+  first_.reset();
+  return tracked;
+}
+
+}  // namespace covsplat

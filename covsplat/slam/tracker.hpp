@@ -1,0 +1,135 @@
+// Tracker: where the sensor was during each scan. Synchronous, knows no threads.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "covsplat/core/stage_times.hpp"
+#include "covsplat/core/trajectory.hpp"
+#include "covsplat/mapping/keyframe.hpp"
+#include "covsplat/registration/deskew.hpp"
+#include "covsplat/registration/gicp.hpp"
+
+namespace covsplat {
+
+enum class TrackState {
+  kInitializing,  ///< no map yet
+  kTracking,      ///< the scan was registered to the map
+  kLost,          ///< it was not; the pose is a prediction and nothing goes into the map
+};
+
+struct RecoveryConfig {
+  double min_inlier_ratio = 0.2;
+  double max_speed_mps = 60.0;
+  double max_turn_rate_degps = 720.0;
+  double retry_gate_factor = 2.0;
+
+  template <class Self, class V>
+  static void Visit(Self& c, V&& v) {
+    v.Field("min_inlier_ratio",
+            c.min_inlier_ratio,
+            Range{0.0, 1.0},
+            "a scan is lost if less than this share of it lies on the map");
+    v.Field("max_speed_mps",
+            c.max_speed_mps,
+            Range{0.1, 1000.0},
+            "... or if it would have moved faster than this");
+    v.Field("max_turn_rate_degps",
+            c.max_turn_rate_degps,
+            Range{1.0, 36000.0},
+            "... or turned faster than this");
+    v.Field("retry_gate_factor",
+            c.retry_gate_factor,
+            Range{1.0, 20.0},
+            "a lost scan is tried once more from standstill with a gate wider by this factor");
+  }
+};
+
+struct TrackerConfig {
+  DeskewConfig deskew;
+  bool refine_deskew = true;
+  PreprocessConfig preprocess;
+  GicpConfig gicp;
+  RecoveryConfig recovery;
+  KeyframeConfig keyframe;
+};
+
+/// What became of one scan.
+struct TrackResult {
+  TrackState state = TrackState::kInitializing;
+  TrackedScan tracked;  ///< pose (a prediction when lost) and deskewed points
+  AlignResult align;    ///< empty unless registered
+  double overlap = 0.0;
+  bool is_keyframe = false;
+  /// With the second usable scan: the first one again, deskewed with the motion found meanwhile.
+  std::optional<TrackedScan> first;
+
+  std::size_t points = 0;      ///< in the scan
+  std::size_t not_finite = 0;  ///< dropped: NaN or infinite
+  std::size_t out_of_range = 0;
+  bool has_time = false;  ///< the points carry times, or they were derived
+  StageTimes times;
+};
+
+class Tracker {
+ public:
+  Tracker(const TrackerConfig& config, ThreadPool& pool);
+
+  /// Registers a scan to the target; `target` may be null or empty until a map exists. Stamps must
+  /// increase.
+  TrackResult Track(const Scan& scan, const RegistrationTarget* target);
+
+  /// Takes the pose from a trajectory instead. Nothing where it has none.
+  std::optional<TrackResult> Follow(const Scan& scan,
+                                    const Trajectory& poses,
+                                    const RegistrationTarget* target);
+
+  /// The only scan of a recording of one, as a keyframe.
+  std::optional<TrackedScan> TakePendingFirst();
+
+ private:
+  struct Prepared {
+    ScanTiming timing;
+    SourceCloud source;
+  };
+  struct FirstScan {
+    Scan scan;
+    Prepared prepared;
+  };
+
+  Prepared Prepare(const Scan& scan,
+                   const ScanTiming& timing,
+                   const ScanMotion& predicted,
+                   TrackResult& result);
+  MotionPrediction Predict(const ScanTiming& timing) const;
+  AlignResult Bootstrap(const Prepared& second, TrackResult& result);
+  AlignResult Register(const SourceCloud& source,
+                       const RegistrationTarget& target,
+                       const MotionPrediction& prediction,
+                       double gap_s);
+  bool IsPlausible(const AlignResult& align, double gap_s) const;
+  TrackedScan Deskewed(const Scan& scan,
+                       const Prepared& prepared,
+                       const ScanMotion& motion,
+                       std::vector<float> squared_distance) const;
+  void Conclude(const Scan& scan,
+                const Prepared& prepared,
+                const ScanMotion& motion,
+                TrackResult& result);
+  bool WantsKeyframe(const SE3& T_map_sensor, double overlap) const;
+
+  const TrackerConfig config_;
+  ThreadPool& pool_;
+
+  std::optional<FirstScan> first_;  ///< until a second scan tells how it moved
+  bool has_motion_ = false;
+  ScanMotion motion_;  ///< of the last scan
+  double last_stamp_s_ = 0.0;
+  double last_duration_s_ = 0.0;
+  int scans_lost_ = 0;  ///< in a row
+
+  std::optional<SE3> T_map_keyframe_;  ///< of the last keyframe
+  int scans_since_keyframe_ = 0;
+};
+
+}  // namespace covsplat
