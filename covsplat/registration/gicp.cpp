@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -14,12 +16,12 @@ namespace {
 
 constexpr std::size_t kMinMatches = 20;
 constexpr double kMinKernelScale = 1e-12;  // of noise-free data
-constexpr double kInfiniteKernel = 1e12;
 
 // Cauchy scale for e^T M e whose median is that of a one-dimensional normal residual (0.455
 // sigma^2): matches are point-to-plane in effect.
 double KernelScale(double median_square, double width) {
-  return std::max(width * width * median_square / 0.455, kMinKernelScale);
+  constexpr double kNoKernel = 1e12;
+  return std::clamp(width * width * median_square / 0.455, kMinKernelScale, kNoKernel);
 }
 
 int Unknowns(MotionModel model, double duration_s) {
@@ -54,36 +56,13 @@ class Aligner {
                    config.planar_weight,
                    pool) {
     result_.motion = prediction.motion;
+    result_.squared_distance.resize(source.Size());
   }
 
+  // Most of the way is gone with a part of the points; then few searches are left for all of them.
   AlignResult Run() && {
-    // Until residuals have been seen there is no scale to judge outliers by.
-    residuals_.Evaluate(result_.motion, kInfiniteKernel, pool_);
-    double median = residuals_.MedianSquare();
-    PhaseMoments moments =
-        residuals_.Reevaluate(result_.motion, KernelScale(median, config_.kernel_width), pool_);
-    while (moments.matches >= kMinMatches && result_.iterations < config_.max_iterations) {
-      ++result_.iterations;
-      const Vector18d step = Solve(moments, result_.motion);
-      if (!step.allFinite()) break;
-      const ScanMotion candidate = Moved(result_.motion, step);
-      const PhaseMoments next =
-          residuals_.Evaluate(candidate, KernelScale(median, config_.kernel_width), pool_);
-      const double next_median = residuals_.MedianSquare();
-      if (next.matches < kMinMatches || next_median > kWorse * median + kMinKernelScale) {
-        damping_ = std::max(10.0 * damping_, kFirstDamping);
-        if (damping_ > kMaxDamping) break;
-        continue;
-      }
-      damping_ *= 0.1;
-      result_.motion = candidate;
-      moments = next;
-      median = next_median;
-      if (IsSmall(step)) {
-        result_.converged = true;
-        break;
-      }
-    }
+    if (result_.squared_distance.size() >= kEnoughForCoarse) Iterate(kCoarseStride, 10.0);
+    const PhaseMoments moments = Iterate(1, 1.0);
     return Finish(moments);
   }
 
@@ -92,6 +71,45 @@ class Aligner {
   static constexpr double kWorse = 1.5;
   static constexpr double kFirstDamping = 1e-2;
   static constexpr double kMaxDamping = 1e3;
+  static constexpr std::size_t kEnoughForCoarse = 4000;
+  static constexpr std::size_t kCoarseStride = 4;
+
+  // Gauss-Newton with every `stride`-th point until steps are small (epsilons times `tolerance`).
+  PhaseMoments Iterate(std::size_t stride, double tolerance) {
+    // Until residuals have been seen there is no scale to judge outliers by.
+    if (!std::isfinite(median_)) Evaluate(result_.motion, stride);
+    PhaseMoments moments = Evaluate(result_.motion, stride);
+    double accepted_median = median_;
+    damping_ = 0.0;
+    result_.converged = false;
+    while (moments.matches >= kMinMatches && result_.iterations < config_.max_iterations) {
+      ++result_.iterations;
+      const Vector18d step = Solve(moments, result_.motion);
+      if (!step.allFinite()) break;
+      const ScanMotion candidate = Moved(result_.motion, step);
+      const PhaseMoments next = Evaluate(candidate, stride);
+      if (next.matches < kMinMatches || median_ > kWorse * accepted_median + kMinKernelScale) {
+        median_ = accepted_median;
+        damping_ = std::max(10.0 * damping_, kFirstDamping);
+        if (damping_ > kMaxDamping) break;
+        continue;
+      }
+      result_.motion = candidate;
+      moments = next;
+      accepted_median = median_;
+      damping_ *= 0.1;
+      result_.converged = IsSmall(step, tolerance);
+      if (result_.converged) break;
+    }
+    return moments;
+  }
+
+  PhaseMoments Evaluate(const ScanMotion& motion, std::size_t stride) {
+    const double scale = KernelScale(median_, config_.kernel_width);
+    const PhaseMoments moments = residuals_.Evaluate(motion, scale, stride, pool_);
+    median_ = residuals_.MedianSquare();
+    return moments;
+  }
 
   // Data and prior, both in units of the residuals' variance, with weak directions tied down.
   Vector18d Solve(const PhaseMoments& moments, const ScanMotion& motion) {
@@ -132,9 +150,9 @@ class Aligner {
     }
   }
 
-  bool IsSmall(const Vector18d& step) const {
-    return step.head<3>().norm() < config_.rotation_epsilon_rad &&
-           step.segment<3>(3).norm() < config_.translation_epsilon_m;
+  bool IsSmall(const Vector18d& step, double tolerance) const {
+    return step.head<3>().norm() < tolerance * config_.rotation_epsilon_rad &&
+           step.segment<3>(3).norm() < tolerance * config_.translation_epsilon_m;
   }
 
   AlignResult Finish(const PhaseMoments& moments) {
@@ -177,6 +195,7 @@ class Aligner {
   AlignResult result_;
   WeakDirections weak_;
   Matrix18d information_ = Matrix18d::Zero();
+  double median_ = std::numeric_limits<double>::infinity();  // of e^T M e, last evaluation
   double damping_ = 0.0;
 };
 

@@ -37,68 +37,70 @@ NearestIndex::NearestIndex(std::span<const Eigen::Vector3f> points, float cell_m
   for (std::size_t c = 1; c < begin_.size(); ++c) begin_[c] += begin_[c - 1];
 
   order_.resize(n);
-  x_.resize(n);
-  y_.resize(n);
-  z_.resize(n);
+  points_.resize(n);
   std::vector<int> next(begin_.begin(), begin_.end() - 1);
   for (std::size_t i = 0; i < n; ++i) {
     const auto slot = static_cast<std::size_t>(next[static_cast<std::size_t>(cell_of[i])]++);
     order_[slot] = static_cast<int>(i);
-    x_[slot] = points[i].x();
-    y_[slot] = points[i].y();
-    z_[slot] = points[i].z();
+    points_[slot] = points[i];
   }
 }
 
-inline void NearestIndex::Consider(std::size_t slot,
-                                   const Eigen::Vector3f& query,
-                                   Match& best) const {
-  const float dx = x_[slot] - query.x();
-  const float dy = y_[slot] - query.y();
-  const float dz = z_[slot] - query.z();
-  const float squared = dx * dx + dy * dy + dz * dz;
-  if (squared > best.squared_distance) return;
-  if (squared == best.squared_distance && (best.slot < 0 || order_[slot] >= IndexOf(best.slot))) {
-    return;
-  }
-  if (squared <= best.squared_distance) best = {static_cast<int>(slot), squared};  // NaN: neither
-}
-
-void NearestIndex::ScanCell(const Eigen::Vector3i& cell,
-                            const Eigen::Vector3f& query,
-                            Match& best) const {
+void NearestIndex::ScanCell(const Eigen::Vector3i& cell, Search& search) const {
   const int position = cells_.Find(cell);
   if (position < 0) return;
-  const auto begin = static_cast<std::size_t>(begin_[static_cast<std::size_t>(position)]);
-  const auto end = static_cast<std::size_t>(begin_[static_cast<std::size_t>(position) + 1]);
-  for (std::size_t slot = begin; slot < end; ++slot) Consider(slot, query, best);
+  const int end = begin_[static_cast<std::size_t>(position) + 1];
+  for (int slot = begin_[static_cast<std::size_t>(position)]; slot < end; ++slot) {
+    const Eigen::Vector3f offset = points_[static_cast<std::size_t>(slot)] - search.query;
+    const float squared = offset.squaredNorm();
+    if (!(squared < search.second_squared) || slot == search.slot) continue;
+    const bool tie =
+        squared == search.squared && search.slot >= 0 && IndexOf(slot) < IndexOf(search.slot);
+    if (squared < search.squared || tie) {
+      if (search.slot >= 0) search.second_squared = search.squared;
+      search.squared = squared;
+      search.slot = slot;
+    } else {
+      search.second_squared = squared;
+    }
+  }
 }
 
 NearestIndex::Match NearestIndex::Nearest(const Eigen::Vector3f& query,
                                           float max_squared,
-                                          int hint) const {
-  Match best{-1, max_squared};
-  if (hint >= 0) Consider(static_cast<std::size_t>(hint), query, best);
+                                          int hint,
+                                          float margin_m) const {
+  constexpr float kSlack = 1.0001f;  // covers rounding
+  Search search{.query = query, .squared = max_squared};
+  if (hint >= 0) {
+    const float squared = (points_[static_cast<std::size_t>(hint)] - query).squaredNorm();
+    if (squared < max_squared) {
+      search.squared = squared;
+      search.slot = hint;
+    }
+  }
   const Eigen::Vector3f position = query * cells_per_m_;
   const Eigen::Vector3i home = CellOf(position);
-  ScanCell(home, query, best);
-  // The other cells that the sphere of the best distance so far reaches. The slack covers rounding.
-  constexpr float kSlack = 1.0001f;
-  const float radius = std::sqrt(best.squared_distance) * cells_per_m_ * kSlack;
+  ScanCell(home, search);
+  // The other cells that the sphere of the best distance so far and the margin reaches.
+  const auto reach = [&] { return (std::sqrt(search.squared) + margin_m) * cells_per_m_ * kSlack; };
+  const float radius = reach();
   const Eigen::Vector3i low = CellOf((position.array() - radius).matrix());
   const Eigen::Vector3i high = CellOf((position.array() + radius).matrix());
   for (int x = low.x(); x <= high.x(); ++x) {
     for (int y = low.y(); y <= high.y(); ++y) {
       for (int z = low.z(); z <= high.z(); ++z) {
         if (x == home.x() && y == home.y() && z == home.z()) continue;
-        const float gap = SquaredGap(position, x, y, z) * cell_m_ * cell_m_;
-        if (gap > best.squared_distance * kSlack) continue;
-        ScanCell({x, y, z}, query, best);
+        const float limit = reach();
+        if (SquaredGap(position, x, y, z) > limit * limit) continue;
+        ScanCell({x, y, z}, search);
       }
     }
   }
-  if (best.slot < 0) best.squared_distance = std::numeric_limits<float>::infinity();
-  return best;
+  if (search.slot < 0) return {};
+  const float distance = std::sqrt(search.squared);
+  return {
+      search.slot, search.squared, std::min(std::sqrt(search.second_squared), distance + margin_m)};
 }
 
 }  // namespace covsplat

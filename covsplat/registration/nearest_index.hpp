@@ -19,6 +19,9 @@ class NearestIndex {
   struct Match {
     int slot = -1;  ///< -1: nothing within the radius
     float squared_distance = std::numeric_limits<float>::infinity();
+    /// No other point is nearer than this, m: after the query has moved by d, the match is still
+    /// the nearest point if it is nearer than clearance_m - d.
+    float clearance_m = 0.0f;
   };
 
   /// `points` must be finite. `cell_m` of about the typical neighbour distance to twice that is
@@ -30,19 +33,29 @@ class NearestIndex {
   int IndexOf(int slot) const { return order_[static_cast<std::size_t>(slot)]; }
 
   /// Nearest point with a squared distance below `max_squared`. A `hint`, a slot that is probably
-  /// near, makes it faster and changes nothing else.
-  Match Nearest(const Eigen::Vector3f& query, float max_squared, int hint = -1) const;
+  /// near, makes it faster and changes nothing else. The search goes `margin_m` beyond the nearest
+  /// point to find the clearance, which is at most that much more than the distance.
+  Match Nearest(const Eigen::Vector3f& query,
+                float max_squared,
+                int hint = -1,
+                float margin_m = 0.0f) const;
 
  private:
-  void ScanCell(const Eigen::Vector3i& cell, const Eigen::Vector3f& query, Match& best) const;
-  void Consider(std::size_t slot, const Eigen::Vector3f& query, Match& best) const;
+  // The two nearest points so far.
+  struct Search {
+    Eigen::Vector3f query;
+    int slot = -1;
+    float squared;
+    float second_squared = std::numeric_limits<float>::infinity();
+  };
+  void ScanCell(const Eigen::Vector3i& cell, Search& search) const;
 
   float cell_m_;
   float cells_per_m_;
-  VoxelHash cells_;               // cell -> position in begin_
-  std::vector<int> begin_;        // [cells + 1], first slot of each cell
-  std::vector<int> order_;        // [N], slot -> original index
-  std::vector<float> x_, y_, z_;  // [N], by slot
+  VoxelHash cells_;                      // cell -> position in begin_
+  std::vector<int> begin_;               // [cells + 1], first slot of each cell
+  std::vector<int> order_;               // [N], slot -> original index
+  std::vector<Eigen::Vector3f> points_;  // [N], by slot
 };
 
 }  // namespace covsplat

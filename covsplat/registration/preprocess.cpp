@@ -34,11 +34,13 @@ std::vector<int> SelectUsable(const Scan& scan,
   return usable;
 }
 
-// Columns along descending variance with the last one facing the sensor at the origin.
-PointCovariance DescribeSurface(const Eigen::Matrix3d& covariance, const Eigen::Vector3d& point) {
-  SymmetricEigen eigen = DecomposeSymmetric(covariance);
-  if (eigen.vectors.col(2).dot(point) > 0.0) eigen.vectors.rightCols<2>() *= -1.0;
-  return {eigen.vectors.cast<float>(), eigen.values.cwiseMax(0.0).cwiseSqrt().cast<float>()};
+// Columns along descending variance, in the point's own frame, the last one facing the sensor.
+PointCovariance DescribeSurface(const SymmetricEigen& surface_mid,
+                                const Eigen::Matrix3f& R_mid_point,
+                                const Eigen::Vector3f& point) {
+  Eigen::Matrix3f axes = R_mid_point.transpose() * surface_mid.vectors.cast<float>();
+  if (axes.col(2).dot(point) > 0.0f) axes.rightCols<2>() *= -1.0f;
+  return {axes, surface_mid.values.cwiseMax(0.0).cwiseSqrt().cast<float>()};
 }
 
 }  // namespace
@@ -80,11 +82,9 @@ SourceCloud Preprocess(const Scan& scan,
       cloud.scan_index[v] = index;
       cloud.points[v] = scan.points[static_cast<std::size_t>(index)];
       cloud.phase[v] = phase_of(index);
-      const Eigen::Matrix3d R =
-          poses.At(cloud.phase[v]).rotation.cast<double>();  // R_mid_s of this point
-      const Eigen::Matrix3d covariance = voxels.CovarianceAround(v, config.covariance_neighbours);
-      cloud.covariance[v] =
-          DescribeSurface(R.transpose() * covariance * R, cloud.points[v].cast<double>());
+      cloud.covariance[v] = DescribeSurface(voxels.SurfaceAround(v, config.covariance_neighbours),
+                                            poses.At(cloud.phase[v]).rotation,
+                                            cloud.points[v]);
     }
   });
   return cloud;

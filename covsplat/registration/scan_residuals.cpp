@@ -53,6 +53,12 @@ Eigen::Matrix<float, 27, 1> PackTerms(const Eigen::Vector3f& lever,
   return v;
 }
 
+Eigen::Matrix<float, 10, 1> LeverTerms(const Eigen::Vector3f& lever) {
+  Eigen::Matrix<float, 10, 1> v;
+  v << 1.0f, lever, lever.x() * lever, lever.y() * lever.tail<2>(), lever.z() * lever.z();
+  return v;
+}
+
 }  // namespace
 
 Matrix6d AdjointOf(const Vector6d& twist) {
@@ -125,6 +131,7 @@ struct ScanResiduals::Frame {
   PoseTable poses;         ///< R_map_s and the lever's offset, axes of the map about the sensor
   Eigen::Vector3f sensor;  ///< position at mid scan relative to the target's origin
   float inverse_kernel_scale;
+  std::size_t stride;
 };
 
 ScanResiduals::ScanResiduals(const SourceCloud& source,
@@ -141,6 +148,8 @@ ScanResiduals::ScanResiduals(const SourceCloud& source,
       covariance_(source.Size()),
       slot_(source.Size(), -1),
       squared_distance_(source.Size(), kInfinity),
+      searched_(source.Size(), Eigen::Vector3f::Zero()),
+      clearance_m_(source.Size(), 0.0f),
       mahalanobis_(source.Size(), kInfinity) {
   COVSPLAT_CHECK(source.phase.size() == source.Size());
   COVSPLAT_CHECK(source.covariance.size() == source.Size());
@@ -154,44 +163,48 @@ ScanResiduals::ScanResiduals(const SourceCloud& source,
 
 PhaseMoments ScanResiduals::Evaluate(const ScanMotion& motion,
                                      double kernel_scale,
+                                     std::size_t stride,
                                      ThreadPool& pool) {
-  return Sum(motion, kernel_scale, true, pool);
-}
-
-PhaseMoments ScanResiduals::Reevaluate(const ScanMotion& motion,
-                                       double kernel_scale,
-                                       ThreadPool& pool) {
-  return Sum(motion, kernel_scale, false, pool);
-}
-
-PhaseMoments ScanResiduals::Sum(const ScanMotion& motion,
-                                double kernel_scale,
-                                bool match,
-                                ThreadPool& pool) {
   const SE3& pose = motion.T_map_sensor;
   const Frame frame{PoseTable(motion, pose.RotationMatrix()),
                     (pose.Translation() - target_.OriginMap()).cast<float>(),
-                    static_cast<float>(1.0 / kernel_scale)};
+                    static_cast<float>(1.0 / kernel_scale),
+                    stride};
   return ParallelSum(
-      pool, source_.Size(), kGrain, PhaseMoments(), [&](std::size_t begin, std::size_t end) {
-        return SumChunk(frame, match, begin, end);
-      });
+      pool,
+      (source_.Size() + stride - 1) / stride,
+      kGrain,
+      PhaseMoments(),
+      [&](std::size_t begin, std::size_t end) { return SumChunk(frame, begin, end); });
 }
 
-PhaseMoments ScanResiduals::SumChunk(const Frame& frame,
-                                     bool match,
-                                     std::size_t begin,
-                                     std::size_t end) {
+// Steps become small soon, and most points then need no search: their match has clearance.
+void ScanResiduals::Match(std::size_t i, const Eigen::Vector3f& position) {
+  constexpr float kMargin = 0.1f;     // m
+  constexpr float kRounding = 1e-4f;  // m
+  if (slot_[i] >= 0) {
+    const float squared = (target_.At(slot_[i]).mean - position).squaredNorm();
+    const float moved = (position - searched_[i]).norm();
+    if (squared < squared_gate_ && std::sqrt(squared) + moved + kRounding < clearance_m_[i]) {
+      squared_distance_[i] = squared;
+      return;
+    }
+  }
+  const auto nearest = target_.Index().Nearest(position, squared_gate_, slot_[i], kMargin);
+  slot_[i] = nearest.slot;
+  squared_distance_[i] = nearest.squared_distance;
+  searched_[i] = position;
+  clearance_m_[i] = nearest.clearance_m;
+}
+
+PhaseMoments ScanResiduals::SumChunk(const Frame& frame, std::size_t begin, std::size_t end) {
   PhaseMoments sums;
-  for (std::size_t i = begin; i < end; ++i) {
+  for (std::size_t k = begin; k < end; ++k) {
+    const std::size_t i = k * frame.stride;
     const PoseTable::Pose pose = frame.poses.At(source_.phase[i]);
     const Eigen::Vector3f lever = pose.rotation * source_.points[i] + pose.translation;
     const Eigen::Vector3f position = lever + frame.sensor;
-    if (match) {
-      const auto nearest = target_.Index().Nearest(position, squared_gate_, slot_[i]);
-      slot_[i] = nearest.slot;
-      squared_distance_[i] = nearest.squared_distance;
-    }
+    Match(i, position);
     if (slot_[i] < 0) {
       mahalanobis_[i] = kInfinity;
       continue;
@@ -204,23 +217,21 @@ PhaseMoments ScanResiduals::SumChunk(const Frame& frame,
     const Eigen::Vector3f m_e = m * e;
     const float square = std::max(e.dot(m_e), 0.0f);
     mahalanobis_[i] = square;
-    const float kernel = 1.0f / (1.0f + square * frame.inverse_kernel_scale);
-    const float weight =
+    const double kernel = 1.0f / (1.0f + square * frame.inverse_kernel_scale);
+    const double weight =
         kernel * surfel.confidence * (planar_weight_ ? surfel.planar_weight : 1.0f);
     const float plane = surfel.normal.dot(e);
 
-    const Eigen::Matrix<double, 27, 1> terms = (weight * PackTerms(lever, m, m_e)).cast<double>();
-    double power = 1.0;
+    const Eigen::Matrix<double, 27, 1> terms = PackTerms(lever, m, m_e).cast<double>();
+    double power = weight;
     for (auto& moment : sums.moment) {
       moment += power * terms;
       power *= static_cast<double>(source_.phase[i]);
     }
-    Eigen::Matrix<float, 10, 1> levers;
-    levers << 1.0f, lever, lever.x() * lever, lever.y() * lever.tail<2>(), lever.z() * lever.z();
-    sums.lever += (weight * m.trace() * levers).cast<double>();
-    sums.weighted_square += static_cast<double>(weight * square);
-    sums.kernel_sum += static_cast<double>(kernel);
-    sums.plane_square += static_cast<double>(kernel * plane * plane);
+    sums.lever += weight * (m.trace() * LeverTerms(lever)).cast<double>();
+    sums.weighted_square += weight * static_cast<double>(square);
+    sums.kernel_sum += kernel;
+    sums.plane_square += kernel * static_cast<double>(plane * plane);
     ++sums.matches;
     sums.inliers += std::abs(plane) < inlier_distance_m_ ? 1 : 0;
   }

@@ -66,11 +66,12 @@ class ScanResiduals {
                 bool planar_weight,
                 ThreadPool& pool);
 
-  /// Finds the nearest surfel of every point and sums up the matches. The robust kernel is
-  /// Cauchy's, 1 / (1 + e^T M e / kernel_scale).
-  PhaseMoments Evaluate(const ScanMotion& motion, double kernel_scale, ThreadPool& pool);
-  /// The same with the matches of the last call to Evaluate.
-  PhaseMoments Reevaluate(const ScanMotion& motion, double kernel_scale, ThreadPool& pool);
+  /// Finds the nearest surfels and sums up the matches of every `stride`-th point. The robust
+  /// kernel is Cauchy's, 1 / (1 + e^T M e / kernel_scale).
+  PhaseMoments Evaluate(const ScanMotion& motion,
+                        double kernel_scale,
+                        std::size_t stride,
+                        ThreadPool& pool);
 
   /// Median of e^T M e over the matches of the last evaluation, infinite if there are none.
   double MedianSquare();
@@ -80,8 +81,8 @@ class ScanResiduals {
 
  private:
   struct Frame;
-  PhaseMoments Sum(const ScanMotion& motion, double kernel_scale, bool match, ThreadPool& pool);
-  PhaseMoments SumChunk(const Frame& frame, bool match, std::size_t begin, std::size_t end);
+  void Match(std::size_t i, const Eigen::Vector3f& position);
+  PhaseMoments SumChunk(const Frame& frame, std::size_t begin, std::size_t end);
 
   const SourceCloud& source_;
   const RegistrationTarget& target_;
@@ -91,6 +92,8 @@ class ScanResiduals {
   std::vector<Eigen::Matrix<float, 6, 1>> covariance_;  // [N] sensor frame at the point's time
   std::vector<int> slot_;                               // [N] nearest surfel, -1 if none
   std::vector<float> squared_distance_;                 // [N]
+  std::vector<Eigen::Vector3f> searched_;               // [N] position at the last search
+  std::vector<float> clearance_m_;                      // [N] of the last search
   std::vector<float> mahalanobis_;                      // [N] e^T M e
   std::vector<float> scratch_;
 };

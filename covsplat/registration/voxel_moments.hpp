@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "covsplat/registration/symmetric_eigen.hpp"
 #include "covsplat/registration/voxel_hash.hpp"
 
 namespace covsplat {
@@ -22,23 +23,28 @@ class VoxelMoments {
   /// The point nearest to the voxel's centre, the lower index among equals.
   int Representative(std::size_t voxel) const { return voxels_[voxel].representative; }
 
-  /// Covariance [m^2] of the surface around a voxel: of the (2 r + 1)^3 voxels around it, with the
-  /// smallest r of at most `kMaxRadius` that has `min_points` measurements and spans a surface.
-  Eigen::Matrix3d CovarianceAround(std::size_t voxel, int min_points) const;
+  /// Covariance [m^2], decomposed, of the surface around a voxel: of the (2 r + 1)^3 voxels around
+  /// it, with the smallest r of at most `kMaxRadius` that has `min_points` measurements and spans a
+  /// surface. Where that is not flat, voxels off the plane through the voxel itself fade out, so
+  /// that walls meeting in a corner keep their own normals.
+  SymmetricEigen SurfaceAround(std::size_t voxel, int min_points) const;
 
  private:
+  using Packed = Eigen::Matrix<float, 6, 1>;  // xx xy xz yy yz zz
   struct Voxel {
     Eigen::Vector3i cell;
     int representative = -1;
     float squared_to_centre = 0.0f;
     float count = 0.0f;
-    Eigen::Vector3f sum = Eigen::Vector3f::Zero();  // relative to the voxel's centre
-    Eigen::Matrix<float, 6, 1> squares = Eigen::Matrix<float, 6, 1>::Zero();  // xx xy xz yy yz zz
+    Eigen::Vector3f mean = Eigen::Vector3f::Zero();  // relative to the voxel's centre
+    Packed spread = Packed::Zero();                  // covariance about the mean
   };
+  struct Plane;
   struct Neighbourhood;
   static constexpr int kMaxRadius = 3;
 
-  Neighbourhood Gather(const Voxel& centre, int radius) const;
+  void Add(Voxel& voxel, const Eigen::Vector3f& point, int index) const;
+  Neighbourhood Gather(const Voxel& centre, int radius, const Plane* plane) const;
 
   float voxel_m_;
   VoxelHash cells_;  // cell -> position in voxels_

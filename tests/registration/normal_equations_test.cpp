@@ -83,7 +83,7 @@ TEST_F(NormalEquationsTest, GradientAndHessianOfAll18UnknownsAgreeWithCentralDif
   constexpr double kNoKernel = 1e12;
   constexpr double kStep = 1e-4;
   ScanResiduals residuals(source_, target_, 1.0, 0.1, true, pool_);
-  const PhaseMoments moments = residuals.Evaluate(motion_, kNoKernel, pool_);
+  const PhaseMoments moments = residuals.Evaluate(motion_, kNoKernel, 1, pool_);
   ASSERT_GT(moments.matches, 1000u);
   const NormalEquations analytic = Assemble(moments, motion_);
   const FrozenCost cost(source_, target_, residuals.Slots(), motion_);
