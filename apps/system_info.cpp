@@ -40,7 +40,7 @@ int CpuCount() {
 
 std::string MachineName() {
   const int cpus = CpuCount();
-  const std::string count = fmt::format("{} CPU{}", cpus, cpus == 1 ? "" : "s");
+  std::string count = fmt::format("{} CPU{}", cpus, cpus == 1 ? "" : "s");
   std::ifstream info("/proc/cpuinfo");
   for (std::string line; std::getline(info, line);) {
     const std::size_t colon = line.find(": ");

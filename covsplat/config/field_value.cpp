@@ -15,6 +15,8 @@ template <class... Visitors>
 struct Overloaded : Visitors... {
   using Visitors::operator()...;
 };
+template <class... Visitors>
+Overloaded(Visitors...) -> Overloaded<Visitors...>;  // clang 14 does not find it by itself
 
 /// std::from_chars does not know the locale; it knows "nan" and "inf", which no field may be.
 template <class T>
@@ -41,6 +43,7 @@ std::string FormatDouble(double number) {
 
 std::string FormatList(const std::vector<double>& numbers) {
   std::vector<std::string> items;
+  items.reserve(numbers.size());
   for (const double number : numbers) items.push_back(FormatDouble(number));
   return fmt::format("[{}]", fmt::join(items, ", "));
 }

@@ -118,7 +118,7 @@ class Loader {
       if (!seen.insert(key).second) {
         return FailAt(path_, line, fmt::format("key '{}' is given twice", key));
       }
-      const Result<void> loaded = LoadKey(key, pair.second, line);
+      Result<void> loaded = LoadKey(key, pair.second, line);
       if (!loaded) return loaded;
     }
     return {};

@@ -34,7 +34,10 @@ Series View(const std::vector<Eigen::Vector3d>& path, int x_axis, int y_axis) {
   return series;
 }
 
-std::string TrajectoryPlot(const ReportData& data, PlotOptions options, int x_axis, int y_axis) {
+std::string TrajectoryPlot(const ReportData& data,
+                           const PlotOptions& options,
+                           int x_axis,
+                           int y_axis) {
   constexpr int kTrack = 0, kKeyframe = 1, kTruth = 2;
   std::vector<Series> curves;
   if (!data.truth_m.empty()) {

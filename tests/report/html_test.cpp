@@ -21,7 +21,7 @@ TEST(EscapeHtml, KeepsUtf8AndReplacesWhatIsNot) {
   EXPECT_EQ(EscapeHtml(std::string_view("\0\x01", 2)), std::string(kReplaced) + kReplaced);
   EXPECT_EQ(EscapeHtml("\xC3"), kReplaced);                               // cut off
   EXPECT_EQ(EscapeHtml("\xC0\xAF"), std::string(kReplaced) + kReplaced);  // overlong
-  EXPECT_EQ(EscapeHtml("\xED\xA0\x80").find("\xED"), std::string::npos);  // surrogate
+  EXPECT_EQ(EscapeHtml("\xED\xA0\x80").find('\xED'), std::string::npos);  // surrogate
 }
 
 TEST(ImageTag, EmbedsThePictureOrIsEmpty) {

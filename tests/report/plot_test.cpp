@@ -16,7 +16,7 @@ std::size_t Count(const std::string& text, const std::string& part) {
   return count;
 }
 
-std::string Plot(const Series& series, PlotOptions options = {}) {
+std::string Plot(const Series& series, const PlotOptions& options = {}) {
   return PlotSvg(options, std::vector<Series>{series});
 }
 
