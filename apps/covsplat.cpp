@@ -1,0 +1,47 @@
+// The command line: one binary, one verb per task.
+#include <cstdio>
+#include <exception>
+
+#include "apps/commands/commands.hpp"
+#include "apps/exit_code.hpp"
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+namespace covsplat {
+namespace {
+
+constexpr const char* kFooter =
+    "Exit codes: 0 ok, 2 usage or configuration, 3 input, 4 output, 5 unavailable, 130 interrupted";
+
+int Run(int argc, char** argv) {
+  int exit_code = kExitOk;
+  CLI::App app("LiDAR-only Gaussian-splatting SLAM", "covsplat");
+  app.set_version_flag("--version", "covsplat " COVSPLAT_VERSION);
+  app.set_help_all_flag("--help-all", "Print the help of every command");
+  app.footer(kFooter);
+  app.require_subcommand(1);
+  AddConfigCommand(app, exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& request) {  // help and version
+    return app.exit(request);
+  } catch (const CLI::ParseError& error) {
+    return ReportError(
+        {ErrorCode::kUsage, fmt::format("{}; --help lists what there is", error.what())});
+  }
+  return exit_code;
+}
+
+}  // namespace
+}  // namespace covsplat
+
+int main(int argc, char** argv) {
+  try {
+    return covsplat::Run(argc, argv);
+  } catch (const std::bad_alloc&) {
+    return covsplat::ReportError({covsplat::ErrorCode::kUnavailable, "out of memory"});
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "covsplat: internal error: %s\n", error.what());
+    return 1;
+  }
+}
