@@ -56,12 +56,11 @@ class Aligner {
                    config.planar_weight,
                    pool) {
     result_.motion = prediction.motion;
-    result_.squared_distance.resize(source.Size());
   }
 
   // Most of the way is gone with a part of the points; then few searches are left for all of them.
   AlignResult Run() && {
-    if (result_.squared_distance.size() >= kEnoughForCoarse) Iterate(kCoarseStride, 10.0);
+    if (residuals_.Size() >= kEnoughForCoarse) Iterate(kCoarseStride, 10.0);
     const PhaseMoments moments = Iterate(1, 1.0);
     return Finish(moments);
   }
@@ -84,6 +83,7 @@ class Aligner {
     result_.converged = false;
     while (moments.matches >= kMinMatches && result_.iterations < config_.max_iterations) {
       ++result_.iterations;
+      widening_ = std::max(1.0, 0.5 * widening_);
       const Vector18d step = Solve(moments, result_.motion);
       if (!step.allFinite()) break;
       const ScanMotion candidate = Moved(result_.motion, step);
@@ -98,14 +98,14 @@ class Aligner {
       moments = next;
       accepted_median = median_;
       damping_ *= 0.1;
-      result_.converged = IsSmall(step, tolerance);
+      result_.converged = widening_ == 1.0 && IsSmall(step, tolerance);
       if (result_.converged) break;
     }
     return moments;
   }
 
   PhaseMoments Evaluate(const ScanMotion& motion, std::size_t stride) {
-    const double scale = KernelScale(median_, config_.kernel_width);
+    const double scale = KernelScale(median_, widening_ * config_.kernel_width);
     const PhaseMoments moments = residuals_.Evaluate(motion, scale, stride, pool_);
     median_ = residuals_.MedianSquare();
     return moments;
@@ -163,7 +163,7 @@ class Aligner {
     result_.correspondences = moments.matches;
     result_.inlier_ratio =
         static_cast<double>(moments.inliers) / static_cast<double>(result_.surfel.size());
-    result_.rms_residual_m = std::sqrt(moments.plane_square / moments.kernel_sum);
+    result_.rms_residual_m = std::sqrt(moments.plane_square / moments.kernel_square_sum);
     result_.weak_rotations = weak_.rotations;
     result_.weak_translations = weak_.translations;
     result_.degenerate_directions =
@@ -196,6 +196,9 @@ class Aligner {
   WeakDirections weak_;
   Matrix18d information_ = Matrix18d::Zero();
   double median_ = std::numeric_limits<double>::infinity();  // of e^T M e, last evaluation
+  // The kernel starts wide: the median is that of the most common surface, say the ground, and with
+  // a poor prediction everything else would be taken for outliers.
+  double widening_ = 16.0;
   double damping_ = 0.0;
 };
 

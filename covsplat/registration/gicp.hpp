@@ -42,8 +42,8 @@ struct GicpConfig {
   MotionModel motion_model = MotionModel::kAcceleration;
   double angular_acceleration_radps2 = 8.0;
   double linear_acceleration_mps2 = 4.0;
-  double begin_rotation_rad = 5e-3;
-  double begin_translation_m = 0.02;
+  double begin_rotation_rad = 2e-3;
+  double begin_translation_m = 0.01;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
@@ -106,7 +106,7 @@ struct AlignResult {
   bool converged = false;
   std::size_t correspondences = 0;      ///< source points with a surfel within the gate
   double inlier_ratio = 0.0;            ///< inliers over all source points
-  double rms_residual_m = 0.0;          ///< point to plane, robustly weighted
+  double rms_residual_m = 0.0;          ///< point to plane; tails fade by the kernel squared
   std::vector<float> squared_distance;  ///< [source] to the nearest surfel's mean, inf if unmatched
   std::vector<int> surfel;              ///< [source] the nearest surfel's index, -1 if unmatched
 

@@ -73,6 +73,7 @@ PhaseMoments& PhaseMoments::operator+=(const PhaseMoments& other) {
   lever += other.lever;
   weighted_square += other.weighted_square;
   kernel_sum += other.kernel_sum;
+  kernel_square_sum += other.kernel_square_sum;
   plane_square += other.plane_square;
   matches += other.matches;
   inliers += other.inliers;
@@ -231,7 +232,8 @@ PhaseMoments ScanResiduals::SumChunk(const Frame& frame, std::size_t begin, std:
     sums.lever += weight * (m.trace() * LeverTerms(lever)).cast<double>();
     sums.weighted_square += weight * static_cast<double>(square);
     sums.kernel_sum += kernel;
-    sums.plane_square += kernel * static_cast<double>(plane * plane);
+    sums.kernel_square_sum += kernel * kernel;
+    sums.plane_square += kernel * kernel * static_cast<double>(plane * plane);
     ++sums.matches;
     sums.inliers += std::abs(plane) < inlier_distance_m_ ? 1 : 0;
   }

@@ -32,9 +32,10 @@ struct PhaseMoments {
   /// Sums of m, m l and m l l^T (m; x y z; xx xy xz yy yz zz) with m = w trace(M) and l the lever
   /// from the sensor to the point: how much the matches would tell if they faced every way.
   Eigen::Matrix<double, 10, 1> lever = Eigen::Matrix<double, 10, 1>::Zero();
-  double weighted_square = 0.0;  ///< sum of w e^T M e
-  double kernel_sum = 0.0;       ///< sum of the robust kernel's weights
-  double plane_square = 0.0;     ///< sum of the kernel's weight * (n^T e)^2
+  double weighted_square = 0.0;    ///< sum of w e^T M e
+  double kernel_sum = 0.0;         ///< sum of the robust kernel's weights
+  double kernel_square_sum = 0.0;  ///< sum of the squares of these weights
+  double plane_square = 0.0;       ///< sum of the kernel's weight squared * (n^T e)^2
   std::size_t matches = 0;
   std::size_t inliers = 0;
 
@@ -76,6 +77,7 @@ class ScanResiduals {
   /// Median of e^T M e over the matches of the last evaluation, infinite if there are none.
   double MedianSquare();
 
+  std::size_t Size() const { return slot_.size(); }
   const std::vector<int>& Slots() const { return slot_; }
   const std::vector<float>& SquaredDistances() const { return squared_distance_; }
 
