@@ -42,8 +42,8 @@ struct GicpConfig {
   MotionModel motion_model = MotionModel::kAcceleration;
   double angular_acceleration_radps2 = 8.0;
   double linear_acceleration_mps2 = 4.0;
-  double begin_rotation_rad = 2e-3;
-  double begin_translation_m = 0.01;
+  double begin_rotation_rad = 5e-4;
+  double begin_translation_m = 2e-3;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
@@ -117,6 +117,11 @@ struct AlignResult {
 };
 
 /// Estimates the motion of the sensor during a scan. Bit-identical for any number of threads.
+///
+/// A map made of scans that were deskewed wrongly, all in the same way, fits further scans that are
+/// deskewed as wrongly: only the prior's continuity from scan to scan tells. So a map should not
+/// begin with a scan whose motion is unknown: align the second scan to the first one as if both
+/// were rigid, take the step between them as the first one's twist, and make its surfels anew.
 AlignResult Align(const SourceCloud& source,
                   const RegistrationTarget& target,
                   const MotionPrediction& prediction,

@@ -26,7 +26,9 @@ void AddSquares(NormalEquations& equations,
 MotionPrior::MotionPrior(const MotionPrediction& prediction,
                          double duration_s,
                          const GicpConfig& config)
-    : predicted_(prediction.motion), active_(prediction.sigma_scale > 0.0 && duration_s > 0.0) {
+    : predicted_(prediction.motion),
+      active_(config.motion_model != MotionModel::kRigid && prediction.sigma_scale > 0.0 &&
+              duration_s > 0.0) {
   if (!active_) return;
   const double scale = prediction.sigma_scale;
   const double change = scale * duration_s * duration_s;  // of velocity per scan, from acceleration

@@ -9,7 +9,8 @@ namespace covsplat {
 /// Half the squares, normalised to unit variance, of three differences from the prediction: where
 /// the scan begins (where the previous one ended), how fast the sensor moves then, and how the
 /// velocity changes. A prediction is a continuation, so this ties a scan to the one before without
-/// knowing it. Their standard deviations are expected accelerations times the scan's duration.
+/// knowing it. It is silent for the rigid model, whose twist is not estimated. Their standard
+/// deviations are expected accelerations times the scan's duration.
 class MotionPrior {
  public:
   MotionPrior(const MotionPrediction& prediction, double duration_s, const GicpConfig& config);

@@ -47,52 +47,66 @@ TEST(RecordedPair, IsAlignedAsItsReferenceSays) {
   EXPECT_LT(RotationError(result.motion.T_map_sensor, truth), 4e-3);
 }
 
+constexpr double kPeriod = 0.10327;
+
+Scan DriveScan(int number) {
+  char name[32];
+  std::snprintf(name, sizeof name, "%06d.bin", number);
+  return ReadVelodyneBin(DataFolder() / "kitti_raw_0005/velodyne" / name);
+}
+
+PreprocessConfig DrivePreprocess() {
+  PreprocessConfig preprocess;
+  preprocess.min_range_m = 2.5;
+  preprocess.max_range_m = 80.0;
+  return preprocess;
+}
+
+// The step from the first scan to the second, both taken as rigid: the first scan's twist.
+Vector6d FirstTwist(ThreadPool& pool) {
+  const auto prepare = [&](int k) {
+    return Preprocess(DriveScan(k), ScanTiming{}, ScanMotion{}, DrivePreprocess(), pool);
+  };
+  const RegistrationTarget target = TargetFrom(prepare(0), SE3());
+  return Align(prepare(1), target, At(SE3()), {}, pool).motion.T_map_sensor.Log();
+}
+
 struct ChainResult {
-  double residual_m = 0.0;   ///< mean over the scans
-  double end_error_m = 0.0;  ///< to the reference
-  double iterations = 0.0;
+  double residual_m = 0.0;   // mean over the scans
+  double end_error_m = 0.0;  // to the reference
+  double gap_m = 0.0;        // mean of |twist - step from the scan before|, translation
 };
 
 // Each scan to the surfels of the last few, all deskewed by what was estimated.
 ChainResult Chain(int scans, const DeskewConfig& deskew, MotionModel model) {
-  constexpr double kPeriod = 0.10327;
   constexpr std::size_t kWindow = 8;
   ThreadPool pool(2);
   GicpConfig config;
   config.motion_model = model;
-  PreprocessConfig preprocess;
-  preprocess.min_range_m = 2.5;
-  preprocess.max_range_m = 80.0;
   ChainResult chain;
   MotionPrediction prediction;
-  prediction.sigma_scale = 0.0;
   std::deque<std::vector<TargetSurfel>> window;
   ScanMotion motion;
-  SE3 before_pose;
+  motion.twist = FirstTwist(pool);
+  prediction.motion = motion;
   for (int k = 0; k < scans; ++k) {
-    char name[32];
-    std::snprintf(name, sizeof name, "%06d.bin", k);
-    const Scan scan = ReadVelodyneBin(DataFolder() / "kitti_raw_0005/velodyne" / name);
+    const Scan scan = DriveScan(k);
     const ScanTiming timing = TimeScan(scan, deskew);
-    SourceCloud source = Preprocess(scan, timing, prediction.motion, preprocess, pool);
+    SourceCloud source = Preprocess(scan, timing, prediction.motion, DrivePreprocess(), pool);
     if (k > 0) {
       std::vector<TargetSurfel> map;
       for (const auto& surfels : window) map.insert(map.end(), surfels.begin(), surfels.end());
       const RegistrationTarget target(map, Eigen::Vector3d::Zero(), 1);
       const AlignResult result = Align(source, target, prediction, config, pool);
+      const Vector6d step = (motion.T_map_sensor.Inverse() * result.motion.T_map_sensor).Log();
       motion = result.motion;
+      if (model == MotionModel::kRigid) motion.twist = step;
       chain.residual_m += result.rms_residual_m / (scans - 1);
-      chain.iterations += static_cast<double>(result.iterations) / (scans - 1);
+      chain.gap_m += (motion.twist - step).tail<3>().norm() / (scans - 1);
     }
-    const double duration = timing.duration_s > 0.0 ? timing.duration_s : kPeriod;
-    if (k > 0 && model == MotionModel::kRigid) {
-      motion.twist = (before_pose.Inverse() * motion.T_map_sensor).Log() * (duration / kPeriod);
-    }
-    if (k==8||k==15||k==19) printf("  k %d twist %.4f %.4f %.4f  %.3f %.3f %.3f | step %.4f %.4f %.4f %.3f %.3f %.3f\n",k,motion.twist[0],motion.twist[1],motion.twist[2],motion.twist[3],motion.twist[4],motion.twist[5],(before_pose.Inverse()*motion.T_map_sensor).Log()[0],(before_pose.Inverse()*motion.T_map_sensor).Log()[1],(before_pose.Inverse()*motion.T_map_sensor).Log()[2],(before_pose.Inverse()*motion.T_map_sensor).Log()[3],(before_pose.Inverse()*motion.T_map_sensor).Log()[4],(before_pose.Inverse()*motion.T_map_sensor).Log()[5]);
-    before_pose = motion.T_map_sensor;
-    prediction = PredictMotion(motion, duration, duration, kPeriod);
-    if (k <= 1) prediction.sigma_scale = 20.0;
-    source.points = Deskew(source.points, source.phase, motion);
+    prediction = PredictMotion(motion, kPeriod, kPeriod, kPeriod);
+    source.points =
+        Deskew(source.points, source.phase, timing.phase.empty() ? ScanMotion{} : motion);
     AppendSurfels(source, motion.T_map_sensor, window.emplace_back());
     if (window.size() > kWindow) window.pop_front();
   }
@@ -107,32 +121,29 @@ TEST(RecordedDrive, FitsBestWithTheTimesOfItsAzimuths) {
   if (ReadVelodyneBin(DataFolder() / "kitti_raw_0005/velodyne/000000.bin").points.empty()) {
     GTEST_SKIP() << "no kitti_raw_0005 in " << DataFolder() << "; set COVSPLAT_DATA";
   }
-  constexpr int kScans = 20;
+  // All of the recording: a map deskewed wrongly fits scans deskewed as wrongly, so a short piece
+  // does not tell the two directions apart by the residual (20 scans: 44.7 and 44.6 mm).
+  constexpr int kScans = 80;
   DeskewConfig none{.time_source = TimeSource::kNone};
   DeskewConfig azimuth{.time_source = TimeSource::kAzimuth, .scan_period_s = 0.10327};
   DeskewConfig reverse = azimuth;
   reverse.azimuth_clockwise = false;
   const auto run = [](const char* name, const DeskewConfig& deskew, MotionModel model) {
     const ChainResult chain = Chain(kScans, deskew, model);
-    std::printf("%-28s residual %.1f mm, end %.0f mm from the reference, %.1f iterations\n",
+    std::printf("%-24s residual %.1f mm, end %.0f mm from the reference, twist off by %.0f mm\n",
                 name,
                 1e3 * chain.residual_m,
                 1e3 * chain.end_error_m,
-                chain.iterations);
+                1e3 * chain.gap_m);
     return chain;
   };
   const ChainResult still = run("no deskew", none, MotionModel::kRigid);
-  const ChainResult wrong = run("wrong direction, rigid", reverse, MotionModel::kRigid);
-  const ChainResult rigid = run("azimuth, rigid", azimuth, MotionModel::kRigid);
-  const ChainResult velocity = run("azimuth, velocity", azimuth, MotionModel::kVelocity);
-  const ChainResult full = run("azimuth, acceleration", azimuth, MotionModel::kAcceleration);
-  run("wrong direction, velocity", reverse, MotionModel::kVelocity);
-  for (const ChainResult& right : {velocity, full}) {
-    EXPECT_LT(right.residual_m, still.residual_m);
-    EXPECT_LT(right.residual_m, wrong.residual_m);
-    EXPECT_LT(right.end_error_m, 0.5);
-  }
-  EXPECT_LE(full.residual_m, rigid.residual_m * 1.1);
+  const ChainResult wrong = run("reverse, acceleration", reverse, MotionModel::kAcceleration);
+  const ChainResult right = run("azimuth, acceleration", azimuth, MotionModel::kAcceleration);
+  EXPECT_LT(right.residual_m, still.residual_m);
+  EXPECT_LT(right.residual_m, wrong.residual_m);
+  EXPECT_LT(right.gap_m, wrong.gap_m);
+  EXPECT_LT(right.end_error_m, 0.1);
 }
 
 }  // namespace
