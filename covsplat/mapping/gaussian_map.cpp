@@ -97,6 +97,26 @@ std::size_t GaussianMap::PruneOpacity(double min_opacity) {
   return removed;
 }
 
+std::vector<Eigen::Vector3f> GaussianMap::MeansNear(const SE3& T_map_sensor,
+                                                    double distance_m) const {
+  std::vector<Eigen::Vector3f> means;
+  const GaussianColumns<float>& table = engine_->Gaussians();
+  const auto limit = static_cast<float>(distance_m * distance_m);
+  for (const AnchorRange& range : engine_->Ranges()) {
+    const SE3 T_sensor_anchor = T_map_sensor.Inverse() * KeyframePose(range.anchor);
+    if (T_sensor_anchor.Translation().norm() > 2.0 * distance_m) continue;
+    const Eigen::Matrix3f rotation = T_sensor_anchor.RotationMatrix().cast<float>();
+    const Eigen::Vector3f translation = T_sensor_anchor.Translation().cast<float>();
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      const Eigen::Vector3f mean(
+          table.Column(kMeanX)[i], table.Column(kMeanY)[i], table.Column(kMeanZ)[i]);
+      const Eigen::Vector3f p = rotation * mean + translation;
+      if (p.squaredNorm() < limit) means.push_back(p);
+    }
+  }
+  return means;
+}
+
 std::size_t GaussianMap::Size() const {
   std::size_t size = 0;
   for (const AnchorRange& range : engine_->Ranges()) size += range.end - range.begin;

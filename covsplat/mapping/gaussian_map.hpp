@@ -32,6 +32,9 @@ class GaussianMap {
   /// Removes Gaussians below an opacity (or no longer finite); returns how many went.
   std::size_t PruneOpacity(double min_opacity);
 
+  /// Means within a distance of a pose, in its frame.
+  std::vector<Eigen::Vector3f> MeansNear(const SE3& T_map_sensor, double distance_m) const;
+
   /// Gaussians in the map, padding not counted.
   std::size_t Size() const;
   int Keyframes() const { return static_cast<int>(engine_->AnchorPoses().size()); }

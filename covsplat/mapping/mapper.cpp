@@ -17,10 +17,14 @@ Mapper::Mapper(std::unique_ptr<SplatEngine> engine,
 
 void Mapper::Insert(const Keyframe& keyframe) {
   const ScopedTimer timer(times_, "insert");
+  const SE3& T_map_sensor = keyframe.tracked.T_map_sensor;
   std::optional<RenderOutput> render;
-  if (map_.Keyframes() > 0) render = Render(keyframe.tracked.T_map_sensor);
-  const SpawnedGaussians spawned =
-      SpawnGaussians(keyframe, render ? &*render : nullptr, sensor_, config_.spawn);
+  if (map_.Keyframes() > 0) render = Render(T_map_sensor);
+  const SpawnedGaussians spawned = SpawnGaussians(keyframe,
+                                                  render ? &*render : nullptr,
+                                                  map_.MeansNear(T_map_sensor, sensor_.MaxRange()),
+                                                  sensor_,
+                                                  config_.spawn);
   const int number = map_.AddKeyframe(keyframe, spawned);
   map_.MarkSeen(number, keyframe, sensor_);
   if (map_.Keyframes() % config_.prune_interval == 0) map_.PruneOpacity(config_.prune_opacity);

@@ -9,9 +9,9 @@
 namespace covsplat {
 
 struct ScheduleConfig {
-  int steps_new = 20;
+  int steps_new = 10;
   int steps_near = 10;
-  int steps_old = 10;
+  int steps_old = 0;
   int steps_per_visit = 10;
   int final_steps = 0;
 

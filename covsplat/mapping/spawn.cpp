@@ -14,6 +14,7 @@ namespace {
 constexpr double kMinIncidence = 0.3;
 /// A Gaussian is no wider than this many standard deviations of the surface around it.
 constexpr double kSurfaceSigmas = 1.5;
+constexpr int kOccupied = 1;
 
 struct Site {
   int row = 0;
@@ -32,21 +33,26 @@ bool IsExplained(const Keyframe& keyframe,
          std::abs(rendered - measured) <= tolerance;
 }
 
-/// Unexplained pixels on a known surface, at most one per voxel.
+/// Unexplained pixels on a known surface, at most one per voxel that is still empty.
 std::vector<Site> ChooseSites(const Keyframe& keyframe,
                               const RenderOutput* render,
+                              std::span<const Eigen::Vector3f> existing_sensor,
                               const SpawnConfig& config) {
+  const auto cells_per_m = static_cast<float>(1.0 / config.voxel_m);
+  VoxelHash taken(keyframe.point.Size() + existing_sensor.size());
+  for (const Eigen::Vector3f& mean : existing_sensor) {
+    taken.FindOrInsert(CellOf(cells_per_m * mean), kOccupied);
+  }
   std::vector<Site> sites;
-  VoxelHash taken(keyframe.point.Size());
   for (int row = 0; row < keyframe.point.Rows(); ++row) {
     for (int column = 0; column < keyframe.point.Columns(); ++column) {
       if (keyframe.surface(row, column) < 0) continue;
       if (IsExplained(keyframe, render, {row, column}, config)) continue;
       const auto point = static_cast<std::size_t>(keyframe.point(row, column));
-      const Eigen::Vector3f& p = keyframe.tracked.points[point];
-      const int fresh = static_cast<int>(sites.size());
-      const Eigen::Vector3i cell = CellOf(p / static_cast<float>(config.voxel_m));
-      if (taken.FindOrInsert(cell, fresh) == fresh) sites.push_back({row, column});
+      const Eigen::Vector3i cell = CellOf(cells_per_m * keyframe.tracked.points[point]);
+      if (taken.Find(cell) >= 0) continue;
+      taken.FindOrInsert(cell, kOccupied);
+      sites.push_back({row, column});
     }
   }
   return sites;
@@ -108,9 +114,10 @@ Eigen::Matrix3f FacingAxes(const Eigen::Matrix3f& axes, const Eigen::Vector3f& p
 
 SpawnedGaussians SpawnGaussians(const Keyframe& keyframe,
                                 const RenderOutput* render,
+                                std::span<const Eigen::Vector3f> existing_sensor,
                                 const SensorModel& sensor,
                                 const SpawnConfig& config) {
-  const std::vector<Site> sites = ChooseSites(keyframe, render, config);
+  const std::vector<Site> sites = ChooseSites(keyframe, render, existing_sensor, config);
   SpawnedGaussians spawned;
   spawned.gaussians.Resize(sites.size());
   for (std::size_t i = 0; i < sites.size(); ++i) {

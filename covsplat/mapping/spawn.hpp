@@ -72,9 +72,12 @@ struct SpawnedGaussians {
   std::vector<float> control_score;  ///< [N] c, NaN where unknown
 };
 
-/// `render`: the map from the keyframe's pose; nothing for the first keyframe.
+/// `render`: the map from the keyframe's pose; nothing for the first keyframe. `existing_sensor`:
+/// means of the map's Gaussians around it; a voxel that has one gets no second, however badly the
+/// pixel is explained (edges and foliage never are).
 SpawnedGaussians SpawnGaussians(const Keyframe& keyframe,
                                 const RenderOutput* render,
+                                std::span<const Eigen::Vector3f> existing_sensor,
                                 const SensorModel& sensor,
                                 const SpawnConfig& config);
 

@@ -50,7 +50,10 @@ GaussianColumns<float> NoisyRoom(const SensorModel& sensor, const RangeMeasureme
 }
 
 std::unique_ptr<SplatEngine> MakeEngine(ThreadPool& pool) {
-  return std::move(MakeSplatEngine(Backend::kCpu, Sensor(), {}, pool).value());
+  EngineConfig config;  // far from the truth: larger steps than a map needs that starts on surfaces
+  config.optimizer.mean_step_m = 1e-3;
+  config.optimizer.rotation_step_rad = 5e-3;
+  return std::move(MakeSplatEngine(Backend::kCpu, Sensor(), config, pool).value());
 }
 
 double MeanRangeError(const RenderOutput& render, const RangeMeasurement& m) {

@@ -82,13 +82,14 @@ void TileBinner::Scatter(int tile_columns, int tile_rows, std::span<const TileBo
     for_each_tile(boxes[item.record], [&](std::size_t tile) { ++cursor_[tile + 1]; });
   }
   for (std::size_t tile = 0; tile < tiles; ++tile) cursor_[tile + 1] += cursor_[tile];
-  bins_.tile_begin = cursor_;
+  bins_.tile_begin.assign(cursor_.begin(), cursor_.end() - 1);
   for (const KeyedRecord& item : order_) {
     std::uint32_t slot = bins_.slot_begin[item.record];
     for_each_tile(boxes[item.record], [&](std::size_t tile) {
       bins_.pairs[cursor_[tile]++] = {item.record, slot++};
     });
   }
+  bins_.tile_end.assign(cursor_.begin(), cursor_.end() - 1);
 }
 
 template void TileBinner::Bin(const ViewGeometry<float>&,

@@ -17,6 +17,8 @@ class TileBinner {
            std::span<const TileBox> boxes);
 
   const TileBins& Bins() const { return bins_; }
+  /// For dropping pairs that turn out to be invisible.
+  TileBins& Bins() { return bins_; }
 
  private:
   void SortByKey();

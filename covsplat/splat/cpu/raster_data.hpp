@@ -104,7 +104,8 @@ struct TilePair {
 
 /// Which Gaussians touch which tile, front to back.
 struct TileBins {
-  std::vector<std::uint32_t> tile_begin;  ///< [tiles + 1] into pairs
+  std::vector<std::uint32_t> tile_begin;  ///< [tiles] into pairs
+  std::vector<std::uint32_t> tile_end;    ///< [tiles]
   std::vector<TilePair> pairs;
   std::vector<std::uint32_t> slot_begin;  ///< [records + 1]
 };

@@ -192,7 +192,7 @@ HWY_INLINE std::size_t BlendTile(const TileJob<S>& job,
                                  Blend<S>& blend,
                                  KeptSurfels<S>& kept) {
   const std::uint32_t begin = job.bins->tile_begin[tile];
-  const std::uint32_t end = job.bins->tile_begin[tile + 1];
+  const std::uint32_t end = job.bins->tile_end[tile];
   kept.MakeRoom(end - begin + 1);
   const TilePair* pairs = job.bins->pairs.data();
   std::size_t count = 0;
@@ -203,6 +203,10 @@ HWY_INLINE std::size_t BlendTile(const TileJob<S>& job,
     kept.pair[count] = pairs[k];
     ++count;
     if (None(blend.transmittance > All(job.view->transmittance_min))) break;
+  }
+  if (job.drop_unseen) {
+    std::copy_n(kept.pair.begin(), count, job.bins->pairs.begin() + begin);
+    job.bins->tile_end[tile] = begin + static_cast<std::uint32_t>(count);
   }
   return count;
 }

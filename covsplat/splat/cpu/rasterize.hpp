@@ -10,7 +10,10 @@ template <class S>
 struct TileJob {
   const ViewGeometry<S>* view = nullptr;
   const SurfelRecord<S>* records = nullptr;
-  const TileBins* bins = nullptr;
+  TileBins* bins = nullptr;
+  /// Drop the pairs that no pixel sees from the tiles' lists: hidden Gaussians and the corners of
+  /// boxes. Right for a few optimiser steps, in which footprints hardly change.
+  bool drop_unseen = false;
   TileImages<S>* images = nullptr;
 
   // For gradients only.

@@ -1,6 +1,7 @@
 #include "covsplat/splat/cpu/rasterizer.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "covsplat/core/check.hpp"
 
@@ -48,6 +49,7 @@ void Rasterizer<S>::LookFrom(const SE3& T_map_sensor,
   std::erase_if(active_, [&](std::uint32_t block) { return !is_visible(block); });
   slots_.resize(16 * Pairs());
   slot_used_.assign(Pairs(), 0);
+  bins_are_fresh_ = true;
 }
 
 // Anchors out of reach of the sensor cannot have visible Gaussians: a Gaussian is at most the
@@ -99,6 +101,7 @@ TileJob<S> Rasterizer<S>::MakeTileJob() {
   job.view = &view_;
   job.records = records_.data();
   job.bins = &binner_.Bins();
+  job.drop_unseen = std::exchange(bins_are_fresh_, false);
   job.images = &images_;
   job.slots = slots_.data();
   job.slot_used = slot_used_.data();

@@ -9,8 +9,9 @@
 namespace covsplat {
 
 /// Usage: LookFrom a pose, then Render, or any number of StepLoss and Optimize (or Collect), with
-/// Refresh after every change of parameters. Bins stay as they were at LookFrom. Results are the
-/// same bits for any number of threads. S is float, or double in tests.
+/// Refresh after every change of parameters. Bins stay as they were at LookFrom, less the pairs
+/// that the first pass over the tiles did not see. Results are the same bits for any number of
+/// threads. S is float, or double in tests.
 template <class S>
 class Rasterizer {
  public:
@@ -70,6 +71,7 @@ class Rasterizer {
   TileImages<S> images_;
   std::vector<S> slots_;
   std::vector<std::uint8_t> slot_used_;
+  bool bins_are_fresh_ = false;  ///< no pass has dropped what is not seen yet
 };
 
 }  // namespace covsplat
