@@ -25,6 +25,7 @@ def run_covsplat(
     command += ["--threads", str(threads)]
     if recording.azimuth_period_s is not None:
         command += ["-s", "deskew.time_source=azimuth"]
+        command += ["-s", f"deskew.scan_period_s={recording.azimuth_period_s}"]
     if not mapping:
         command += ["-s", "mapping.enabled=false"]
     before_s = children_cpu_s()

@@ -118,11 +118,11 @@ def measure(recording: Recording, name: str, threads: int, run: Run) -> report.R
     measured_by = "exact truth" if recording.is_simulated else "reference"
     try:
         outcome, scans_per_s = run()
-    except Exception as error:
+        errors = errors_of(outcome.trajectory, recording)
+    except Exception as error:  # a failed method is a row of the table, not the end of the others
         return report.Row(
             recording.name, name, measured_by, threads, len(recording), failure=str(error)
         )
-    errors = errors_of(outcome.trajectory, recording)
     return report.Row(
         recording.name,
         name,
@@ -145,6 +145,8 @@ def errors_of(estimate: Trajectory, recording: Recording) -> np.ndarray:
     A reference knows the stamps only, so there the estimate is interpolated; stamps before its
     first pose (KISS-ICP's is half a turn late) are left out.
     """
+    if not np.isfinite(estimate.positions).all():
+        raise ValueError("the trajectory is not finite")
     truth = recording.truth()
     if recording.is_simulated:
         covered = truth.covers(estimate.times_s)

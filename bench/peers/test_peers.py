@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import tempfile
 import unittest
+from pathlib import Path
 
 import numpy as np
 
-from recording import Scan, deskewed
+import report
+from covsplat_run import run_covsplat
+from recording import Recording, Scan, deskewed
 from se3 import Trajectory, orthonormal, position_errors, quaternion_of, rotations_of
 
 
@@ -54,6 +58,41 @@ class DeskewTest(unittest.TestCase):
         middle = truth.at(np.array([1.0]))
         expected = (scene - middle.positions) @ rotations_of(middle.quaternions)[0]
         np.testing.assert_allclose(deskewed(Scan(1.0, seen, offsets_s), truth), expected, atol=1e-9)
+
+
+FAKE_BINARY = """#!/bin/sh
+while [ "$1" != -o ]; do shift; done
+cd "$2" || exit 4
+printf '0 0 0 0 0 0 0 1\\n0.1 1 0 0 0 0 0 1\\n' > trajectory_tum.txt
+printf 'scan,track_ms\\n0,12.5\\n1,7.5\\n' > frames.csv
+printf '{"time": {"scans_per_s": 9.5}}' > metrics.json
+"""
+
+
+class CovsplatRunTest(unittest.TestCase):
+    def test_reads_what_a_run_writes_and_reports_what_fails(self) -> None:
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            binary = folder / "covsplat"
+            binary.write_text(FAKE_BINARY)
+            binary.chmod(0o755)
+            recording = Recording(folder, np.array([0.0, 0.1]), 0.1)
+            outcome, rate = run_covsplat(binary, recording, folder, 2, mapping=True)
+            np.testing.assert_allclose(outcome.trajectory.positions[:, 0], [0, 1])
+            self.assertEqual((outcome.wall_ms, rate), ([12.5, 7.5], 9.5))
+            with self.assertRaisesRegex(RuntimeError, "exit code 4"):
+                run_covsplat(binary, recording, folder / "nowhere", 2, mapping=True)
+
+
+class ReportTest(unittest.TestCase):
+    def test_only_what_stands_between_the_markers_changes(self) -> None:
+        with tempfile.TemporaryDirectory() as name:
+            page = Path(name) / "page.md"
+            page.write_text(f"before\n{report.BEGIN}\nold\n{report.END}\nafter\n")
+            report.update(page, "new\n")
+            self.assertEqual(
+                page.read_text(), f"before\n{report.BEGIN}\nnew\n{report.END}\nafter\n"
+            )
 
 
 class KissIcpPoseTimeTest(unittest.TestCase):
