@@ -1,10 +1,13 @@
 # The short way to everything; CMake presets do the work.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test bench format tidy docs clean
+.PHONY: help setup demo test bench bench-peers check-map format tidy docs clean
+
+COVSPLAT_DATA ?= ../shared/data
+THREADS ?= 2
 
 help:  ## List the targets
-	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/\1\t\2/' | \
-	  awk -F '\t' '{printf "  make %-8s %s\n", $$1, $$2}'
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1\t\2/' | \
+	  awk -F '\t' '{printf "  make %-11s %s\n", $$1, $$2}'
 
 setup:  ## Install the Debian packages that are missing
 	@tools/setup.sh
@@ -23,6 +26,27 @@ bench: setup build-release  ## Run the benchmarks
 	@for b in build/release/bench/*_bench; do \
 	  if [ -x "$$b" ]; then echo "$$b" && "$$b" || exit 1; fi; \
 	done
+
+# The peers need packages of PyPI; they live in .venv and nowhere else.
+.venv/peers: bench/peers/requirements.txt
+	python3 -m venv .venv
+	.venv/bin/pip install --quiet --disable-pip-version-check -r $<
+	@touch $@
+
+bench-peers: setup build-release .venv/peers  ## Compare with KISS-ICP and small_gicp: docs/benchmarks.md
+	build/release/apps/covsplat simulate courtyard -o bench_out/courtyard --overwrite
+	.venv/bin/python bench/peers/run.py --covsplat build/release/apps/covsplat \
+	  --recording bench_out/courtyard --data $(COVSPLAT_DATA) \
+	  --azimuth-time kitti_raw_0005=0.1033 --threads $(THREADS) --out bench_out \
+	  --update docs/benchmarks.md
+
+tools/node_modules: tools/package-lock.json
+	npm --prefix tools ci --no-audit --no-fund
+	@touch $@
+
+check-map: tools/node_modules  ## Check that MAP=map.ply opens in Spark (needs node 20)
+	@test -n "$(MAP)" || { echo "say which: make check-map MAP=folder/map.ply"; exit 2; }
+	node tools/check_map_ply.mjs "$(MAP)"
 
 format:  ## Format the sources
 	@tools/setup.sh --with-dev
