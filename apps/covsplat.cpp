@@ -20,6 +20,11 @@ int Run(int argc, char** argv) {
   app.set_help_all_flag("--help-all", "Print the help of every command");
   app.footer(kFooter);
   app.require_subcommand(1);
+  AddRunCommand(app, exit_code);
+  AddDemoCommand(app, exit_code);
+  AddSimulateCommand(app, exit_code);
+  AddInfoCommand(app, exit_code);
+  AddEvalCommand(app, exit_code);
   AddConfigCommand(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -33,11 +33,11 @@ double ShareDone(const ProgressStatus& status) {
 /// "12.7 scan/s  78.7 ms  184 213 Gaussians  412 MB  ETA 0:21"
 std::string Numbers(const ProgressStatus& status, double elapsed_s) {
   const double rate = elapsed_s > 0.0 ? static_cast<double>(status.done) / elapsed_s : 0.0;
-  std::string text = fmt::format("{:.1f} scan/s  {:.1f} ms  {} Gaussians  {}",
-                                 rate,
-                                 status.ms_per_scan,
-                                 FormatCount(static_cast<double>(status.gaussians)),
-                                 FormatBytes(static_cast<double>(status.rss_bytes)));
+  std::string text = fmt::format("{:.1f} scan/s  {:.1f} ms", rate, status.ms_per_scan);
+  if (status.gaussians >= 0) {
+    text += fmt::format("  {} Gaussians", FormatCount(static_cast<double>(status.gaussians)));
+  }
+  text += "  " + FormatBytes(static_cast<double>(status.rss_bytes));
   if (status.lost > 0) text += fmt::format("  {} lost", status.lost);
   if (status.done >= status.total || rate <= 0.0) return text;
   return text + "  ETA " + FormatSeconds(static_cast<double>(status.total - status.done) / rate);

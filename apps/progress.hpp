@@ -13,7 +13,7 @@ struct ProgressStatus {
   std::int64_t done = 0;
   std::int64_t total = 0;  ///< 0 if it is not known
   double ms_per_scan = 0.0;
-  std::int64_t gaussians = 0;
+  std::int64_t gaussians = 0;  ///< negative: there is no map
   std::int64_t rss_bytes = 0;
   std::int64_t lost = 0;
 };

@@ -15,7 +15,7 @@ EDGES = {
     "sim": ["io"],
     "eval": ["io"],
     "config": [],
-    "mapping": ["registration", "splat"],
+    "mapping": ["io", "registration", "splat"],
     "slam": ["mapping", "registration", "splat"],
     "report": ["eval", "io", "slam", "mapping", "splat"],
     "apps": ["config", "eval", "io", "mapping", "registration", "report", "sim", "slam", "splat"],

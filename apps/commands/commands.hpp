@@ -8,6 +8,21 @@ class App;
 
 namespace covsplat {
 
+/// run <recording>
+void AddRunCommand(CLI::App& app, int& exit_code);
+
+/// demo
+void AddDemoCommand(CLI::App& app, int& exit_code);
+
+/// simulate <world>
+void AddSimulateCommand(CLI::App& app, int& exit_code);
+
+/// info <recording | map.ply | run folder>
+void AddInfoCommand(CLI::App& app, int& exit_code);
+
+/// eval traj <estimate> <truth>
+void AddEvalCommand(CLI::App& app, int& exit_code);
+
 /// config dump | check | describe
 void AddConfigCommand(CLI::App& app, int& exit_code);
 

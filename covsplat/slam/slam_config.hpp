@@ -12,6 +12,8 @@ namespace covsplat {
 struct SensorConfig {
   std::vector<double> elevation_deg;
   int columns = 0;
+  double min_range_m = 0.0;
+  double max_range_m = 0.0;
   int max_columns = 1024;
   int estimate_scans = 5;
 
@@ -25,6 +27,14 @@ struct SensorConfig {
             c.columns,
             Range{0, 16384},
             "columns of the range image over the full turn, a multiple of 4; 0: estimated");
+    v.Field("min_range_m",
+            c.min_range_m,
+            Range{0.0, 100.0},
+            "nearest return the map is made of; 0: estimated");
+    v.Field("max_range_m",
+            c.max_range_m,
+            Range{0.0, 1000.0},
+            "farthest return the map is made of; 0: estimated");
     v.Field("max_columns", c.max_columns, Range{64, 16384}, "estimate at most so many columns");
     v.Field("estimate_scans", c.estimate_scans, Range{1, 100}, "scans to estimate from");
   }

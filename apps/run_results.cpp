@@ -1,0 +1,174 @@
+#include "apps/run_results.hpp"
+
+#include <algorithm>
+
+#include "apps/error_json.hpp"
+#include "apps/system_info.hpp"
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "covsplat/report/format.hpp"
+
+namespace covsplat {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void AddScaled(const HeldOutErrors& errors, double weight, HeldOutErrors& sum) {
+  sum.pixels += errors.pixels;
+  sum.mean_abs_m += weight * errors.mean_abs_m;
+  sum.median_abs_m += weight * errors.median_abs_m;
+  sum.coverage += weight * errors.coverage;
+}
+
+Json ErrorsJson(const HeldOutErrors& errors) {
+  return {{"mean_abs_m", errors.mean_abs_m},
+          {"median_abs_m", errors.median_abs_m},
+          {"coverage", errors.coverage},
+          {"pixels", errors.pixels}};
+}
+
+Json HeldOutJson(const RunResults& results) {
+  const std::optional<HeldOutMeans> means = MeansOf(results.held_out);
+  if (!means) return nullptr;
+  Json json = {{"scans", results.held_out.size()},
+               {"before", ErrorsJson(means->before)},
+               {"after", ErrorsJson(means->after)}};
+  for (const HeldOutResult& scan : results.held_out) {
+    json["each"].push_back({{"scan", scan.scan},
+                            {"before", ErrorsJson(scan.before)},
+                            {"after", ErrorsJson(scan.after)}});
+  }
+  return json;
+}
+
+Json ScansJson(const RunResults& results) {
+  return {{"tracked", results.records.size()},
+          {"lost", LostScans(results)},
+          {"dropped", results.feed.dropped},
+          {"damaged", results.feed.damaged},
+          {"backwards", results.feed.backwards},
+          {"without_pose", results.without_pose}};
+}
+
+/// Mean over all scans of what the stages took, and the mapper's total.
+Json TimesJson(const RunResults& results) {
+  StageTimes sum;
+  double track_ms = 0.0;
+  for (const ScanRecord& record : results.records) {
+    track_ms += record.track_ms;
+    for (const auto& [stage, ms] : record.times.Stages()) sum.Add(stage, ms);
+  }
+  const double scans = std::max<double>(1.0, static_cast<double>(results.records.size()));
+  Json json = {{"feed_s", results.feed_s},
+               {"finish_s", results.finish_s},
+               {"scans_per_s", ScansPerSecond(results)},
+               {"track_ms_per_scan", track_ms / scans}};
+  for (const auto& [stage, ms] : sum.Stages()) {
+    json["stage_ms_per_scan"][std::string(stage)] = ms / scans;
+  }
+  for (const auto& [stage, ms] : results.mapper_times.Stages()) {
+    json["mapper_thread_ms"][std::string(stage)] = ms;
+  }
+  return json;
+}
+
+}  // namespace
+
+Trajectory TrajectoryOf(const RunResults& results) {
+  Trajectory trajectory;
+  for (const ScanRecord& r : results.records) trajectory.push_back({r.stamp_s, r.T_map_sensor});
+  return trajectory;
+}
+
+double PathLengthOf(const RunResults& results) {
+  std::vector<SE3> poses;
+  for (const ScanRecord& record : results.records) poses.push_back(record.T_map_sensor);
+  return poses.empty() ? 0.0 : PathLength(poses);
+}
+
+std::int64_t LostScans(const RunResults& results) {
+  return std::count_if(results.records.begin(), results.records.end(), [](const ScanRecord& r) {
+    return r.state == TrackState::kLost;
+  });
+}
+
+double ScansPerSecond(const RunResults& results) {
+  if (results.feed_s <= 0.0) return 0.0;
+  return static_cast<double>(results.records.size()) / results.feed_s;
+}
+
+std::optional<HeldOutMeans> MeansOf(const std::vector<HeldOutResult>& held_out) {
+  if (held_out.empty()) return std::nullopt;
+  HeldOutMeans means;
+  const double weight = 1.0 / static_cast<double>(held_out.size());
+  for (const HeldOutResult& scan : held_out) {
+    AddScaled(scan.before, weight, means.before);
+    AddScaled(scan.after, weight, means.after);
+  }
+  return means;
+}
+
+std::string MetricsJson(const RunResults& results) {
+  const MemoryUse memory = ReadMemoryUse();
+  Json json = {
+      {"version", COVSPLAT_VERSION},
+      {"recording", results.recording.string()},
+      {"interrupted", results.interrupted},
+      {"sensor", results.sensor_verdict},
+      {"schedule", results.schedule},
+      {"backend", results.backend},
+      {"threads", results.threads},
+      {"machine", MachineName()},
+      {"scans", ScansJson(results)},
+      {"path_length_m", PathLengthOf(results)},
+      {"time", TimesJson(results)},
+      {"memory", {{"rss_bytes", memory.rss_bytes}, {"peak_rss_bytes", memory.peak_rss_bytes}}},
+      {"map",
+       {{"gaussians", results.gaussians},
+        {"keyframes", results.keyframes},
+        {"optimizer_steps", results.mapper_steps},
+        {"file_bytes", results.map_bytes}}},
+      {"held_out", HeldOutJson(results)}};
+  if (results.truth) json["ground_truth"] = results.truth->path.string();
+  json["trajectory_error"] = results.error ? ErrorJson(*results.error) : Json(nullptr);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string SummaryText(const RunResults& results) {
+  const auto count = [](auto n) { return FormatCount(static_cast<double>(n)); };
+  std::string scans = count(results.records.size());
+  const auto add = [&](std::int64_t n, const char* what) {
+    if (n > 0) scans += fmt::format(", {} {}", n, what);
+  };
+  add(LostScans(results), "lost");
+  add(results.feed.dropped, "dropped");
+  add(results.feed.damaged, "damaged");
+  add(results.feed.backwards, "out of order");
+  add(results.without_pose, "without a given pose");
+  std::string text = fmt::format(
+      "scans       {}\nspeed       {:.1f} scan/s ({} and {} to finish)\n"
+      "path        {}\nmap         {} Gaussians, {}, {} keyframes\n",
+      scans,
+      ScansPerSecond(results),
+      FormatSeconds(results.feed_s),
+      FormatSeconds(results.finish_s),
+      FormatMetres(PathLengthOf(results)),
+      count(results.gaussians),
+      FormatBytes(results.map_bytes),
+      count(results.keyframes));
+  if (const auto means = MeansOf(results.held_out)) {
+    text += fmt::format("depth error {} as spawned, {} optimised (mean over {} held-out scans)\n",
+                        FormatMetres(means->before.mean_abs_m),
+                        FormatMetres(means->after.mean_abs_m),
+                        results.held_out.size());
+  }
+  if (results.error) {
+    text += fmt::format("trajectory  {} ATE RMSE to {}\n",
+                        FormatMetres(results.error->ate_translation_m.rmse),
+                        results.truth->path.string());
+  }
+  return text;
+}
+
+}  // namespace covsplat

@@ -1,0 +1,151 @@
+#include "apps/scan_feed.hpp"
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace covsplat {
+namespace {
+
+class FileFeed : public ScanFeed {
+ public:
+  FileFeed(std::unique_ptr<ScanSource> source, std::int64_t jump, std::function<bool()> stop)
+      : source_(std::move(source)), jump_(jump), stop_(std::move(stop)) {}
+
+  std::optional<Scan> Next() override {
+    while (!stop_()) {
+      Result<std::optional<Scan>> read = source_->Next();
+      const bool wanted = taken_++ % jump_ == 0;
+      if (read && !*read) return std::nullopt;
+      if (!wanted) continue;
+      if (!read) {
+        ++counts_.damaged;
+        problems_.push_back({-1, read.error().message + "; the scan is left out"});
+      } else if (last_stamp_s_ && (*read)->stamp_s <= *last_stamp_s_) {
+        ++counts_.backwards;
+        problems_.push_back({(*read)->index, Backwards(**read)});
+      } else {
+        last_stamp_s_ = (*read)->stamp_s;
+        return std::move(*read);
+      }
+    }
+    return std::nullopt;
+  }
+
+  FeedCounts Counts() override { return counts_; }
+  std::vector<FeedProblem> TakeProblems() override { return std::exchange(problems_, {}); }
+
+ private:
+  std::string Backwards(const Scan& scan) const {
+    return fmt::format(
+        "{}: its time {:.6f} s is not later than {:.6f} s of the scan before; the "
+        "scan is left out",
+        scan.source,
+        scan.stamp_s,
+        *last_stamp_s_);
+  }
+
+  std::unique_ptr<ScanSource> source_;
+  const std::int64_t jump_;
+  const std::function<bool()> stop_;
+  std::int64_t taken_ = 0;
+  std::optional<double> last_stamp_s_;
+  FeedCounts counts_;
+  std::vector<FeedProblem> problems_;
+};
+
+class RealtimeFeed : public ScanFeed {
+ public:
+  RealtimeFeed(std::unique_ptr<ScanFeed> feed, std::function<bool()> stop)
+      : feed_(std::move(feed)), stop_(std::move(stop)) {}
+  ~RealtimeFeed() override { thread_ = {}; }  // asks it to stop and joins
+
+  std::optional<Scan> Next() override {
+    if (!thread_.joinable()) {
+      thread_ = std::jthread([this](const std::stop_token& token) { Deliver(token); });
+    }
+    std::unique_lock lock(mutex_);
+    while (!waiting_ && !ended_ && !stop_()) news_.wait_for(lock, kPatience);
+    return std::exchange(waiting_, std::nullopt);
+  }
+
+  FeedCounts Counts() override {
+    const std::scoped_lock lock(mutex_);
+    return counts_;
+  }
+  std::vector<FeedProblem> TakeProblems() override {
+    const std::scoped_lock lock(mutex_);
+    return std::exchange(problems_, {});
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds kPatience{50};
+
+  void Deliver(const std::stop_token& token) {
+    const Clock::time_point start = Clock::now();
+    std::optional<double> first_stamp_s;
+    while (!token.stop_requested()) {
+      std::optional<Scan> scan = feed_->Next();
+      if (!scan) break;
+      if (!first_stamp_s) first_stamp_s = scan->stamp_s;
+      const std::chrono::duration<double> after(scan->stamp_s - *first_stamp_s);
+      const auto due = start + std::chrono::duration_cast<Clock::duration>(after);
+      while (Clock::now() < due && !token.stop_requested()) {
+        std::this_thread::sleep_until(std::min(due, Clock::now() + kPatience));
+      }
+      Put(std::move(*scan));
+    }
+    const std::scoped_lock lock(mutex_);
+    ended_ = true;
+    TakeOver();
+    news_.notify_one();
+  }
+
+  void Put(Scan scan) {
+    const std::scoped_lock lock(mutex_);
+    TakeOver();
+    if (waiting_) ++dropped_;
+    counts_.dropped = dropped_;
+    waiting_ = std::move(scan);
+    news_.notify_one();
+  }
+
+  void TakeOver() {
+    counts_ = feed_->Counts();
+    counts_.dropped = dropped_;
+    for (FeedProblem& problem : feed_->TakeProblems()) problems_.push_back(std::move(problem));
+  }
+
+  const std::unique_ptr<ScanFeed> feed_;  // of the thread
+  const std::function<bool()> stop_;
+  std::mutex mutex_;
+  std::condition_variable news_;
+  // All guarded by mutex_.
+  std::optional<Scan> waiting_;
+  bool ended_ = false;
+  std::int64_t dropped_ = 0;
+  FeedCounts counts_;
+  std::vector<FeedProblem> problems_;
+
+  std::jthread thread_;  // last: joins before the rest goes
+};
+
+}  // namespace
+
+std::unique_ptr<ScanFeed> MakeFeed(std::unique_ptr<ScanSource> source,
+                                   std::int64_t jump,
+                                   std::function<bool()> stop) {
+  return std::make_unique<FileFeed>(std::move(source), jump, std::move(stop));
+}
+
+std::unique_ptr<ScanFeed> MakeRealtimeFeed(std::unique_ptr<ScanFeed> feed,
+                                           std::function<bool()> stop) {
+  return std::make_unique<RealtimeFeed>(std::move(feed), std::move(stop));
+}
+
+}  // namespace covsplat

@@ -1,0 +1,47 @@
+// ScanFeed: the scans of a recording as a run takes them, with what went wrong on the way.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "covsplat/io/scan_source.hpp"
+
+namespace covsplat {
+
+struct FeedCounts {
+  std::int64_t damaged = 0;    ///< could not be read
+  std::int64_t backwards = 0;  ///< not later than the scan before
+  std::int64_t dropped = 0;    ///< came while the tracker was busy and were overtaken
+};
+
+struct FeedProblem {
+  std::int64_t scan = -1;  ///< -1: not known
+  std::string text;
+};
+
+/// One caller's thread.
+class ScanFeed {
+ public:
+  virtual ~ScanFeed() = default;
+  /// The next usable scan; nothing at the end or when `stop` says so.
+  virtual std::optional<Scan> Next() = 0;
+  virtual FeedCounts Counts() = 0;
+  /// What went wrong since the last call.
+  virtual std::vector<FeedProblem> TakeProblems() = 0;
+};
+
+/// Every `jump`-th scan, as fast as it is asked for.
+std::unique_ptr<ScanFeed> MakeFeed(std::unique_ptr<ScanSource> source,
+                                   std::int64_t jump,
+                                   std::function<bool()> stop);
+
+/// The scans of another feed at the times of their stamps, from the first call on. One scan waits;
+/// a newer one takes its place.
+std::unique_ptr<ScanFeed> MakeRealtimeFeed(std::unique_ptr<ScanFeed> feed,
+                                           std::function<bool()> stop);
+
+}  // namespace covsplat

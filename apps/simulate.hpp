@@ -1,0 +1,23 @@
+// Recording a simulated walk.
+#pragma once
+
+#include <filesystem>
+
+#include "apps/exit_code.hpp"
+
+#include "covsplat/sim/simulation.hpp"
+
+namespace covsplat {
+
+struct SimulateRequest {
+  SimulationConfig config;
+  std::filesystem::path folder;
+  bool overwrite = false;
+  bool quiet = false;
+};
+
+/// Writes the recording with its ground truth. A signal (see InterruptGuard, which the caller
+/// holds) ends it early and leaves a shorter, whole recording.
+ExitCode Simulate(const SimulateRequest& request);
+
+}  // namespace covsplat

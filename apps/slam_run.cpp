@@ -1,0 +1,203 @@
+#include "apps/slam_run.hpp"
+
+#include <chrono>
+#include <utility>
+
+#include "apps/interrupt.hpp"
+#include "apps/progress.hpp"
+#include "apps/run_conclusion.hpp"
+#include "apps/run_log.hpp"
+#include "apps/run_truth.hpp"
+#include "apps/sensor_choice.hpp"
+#include "apps/system_info.hpp"
+#include <fmt/format.h>
+
+#include "covsplat/config/config.hpp"
+#include "covsplat/io/trajectory_file.hpp"
+
+namespace covsplat {
+namespace {
+
+constexpr std::size_t kMaxWarnings = 10;
+
+SourceOptions SourceOf(const RunRequest& request) {
+  SourceOptions options;
+  options.format = request.config.input.format;
+  options.first_scan = request.first_scan;
+  if (request.max_scans >= 0) options.max_scans = request.max_scans * request.jump;
+  options.kitti_elevation_correction_deg = request.config.input.kitti_elevation_correction_deg;
+  options.scan_period_s = request.config.input.scan_period_s;
+  return options;
+}
+
+/// What a run needs before its first scan.
+struct Prepared {
+  std::unique_ptr<ScanFeed> feed;
+  std::int64_t scans = 0;
+  std::unique_ptr<SlamSystem> system;
+  std::filesystem::path folder;
+  RunResults results;
+};
+
+Result<Prepared> Prepare(RunRequest& request) {
+  Prepared run;
+  const SourceOptions options = SourceOf(request);
+  auto source = OpenScanSource(request.recording, options);
+  if (!source) return Forward(source);
+  run.results.source = (*source)->Description();
+  run.scans = ((*source)->ScanCount() + request.jump - 1) / request.jump;
+  run.feed = MakeFeed(std::move(*source), request.jump, Interrupted);
+  if (request.realtime) run.feed = MakeRealtimeFeed(std::move(run.feed), Interrupted);
+
+  auto truth = LoadTruth(request.recording, request.truth, request.config.input.scan_period_s);
+  if (!truth) return Forward(truth);
+  run.results.truth = std::move(*truth);
+  const auto sensor = ChooseSensor(request.recording, options, request.config.slam);
+  if (!sensor) return Forward(sensor);
+  run.results.sensor_verdict = sensor->verdict;
+  auto system = SlamSystem::Create(request.config.slam, sensor->model);
+  if (!system) return Forward(system);
+  run.system = std::move(*system);
+  if (request.poses) {
+    const double period_s = request.config.input.scan_period_s;
+    Result<Trajectory> poses = LoadForRecording(*request.poses, request.recording, period_s);
+    if (!poses) return Forward(poses);
+    run.system->UsePoses(std::move(*poses));
+  }
+  const auto folder = MakeRunFolder(request.folder, std::time(nullptr));
+  if (!folder) return Forward(folder);
+  run.folder = *folder;
+  return run;
+}
+
+void DescribeRun(const RunRequest& request, RunResults& results) {
+  const SystemConfig& system = request.config.slam.system;
+  results.recording = request.recording;
+  results.command_line = request.command_line;
+  results.threads = system.threads > 0 ? system.threads : CpuCount();
+  for (const auto& [value, name] : EnumNames<Schedule>::kNames) {
+    if (value == system.schedule) results.schedule = name;
+  }
+  for (const auto& [value, name] : EnumNames<Backend>::kNames) {
+    if (value == system.backend) results.backend = name;
+  }
+  if (system.backend == Backend::kAuto) results.backend = "cpu";
+}
+
+/// Prints the first problems and keeps all.
+void NoteProblems(ScanFeed& feed, Progress& progress, RunResults& results) {
+  for (FeedProblem& problem : feed.TakeProblems()) {
+    const std::size_t seen = results.problems.size();
+    if (seen < kMaxWarnings) progress.Message("covsplat: warning: " + problem.text);
+    if (seen == kMaxWarnings) {
+      progress.Message("covsplat: warning: further scans are left out; the report counts them");
+    }
+    results.problems.push_back(std::move(problem));
+  }
+}
+
+ProgressStatus StatusOf(const Prepared& run, std::int64_t fed, std::int64_t lost) {
+  ProgressStatus status;
+  const ScanRecord& record = run.results.records.back();
+  status.done = fed;
+  status.total = run.scans;
+  status.ms_per_scan = record.track_ms;
+  status.gaussians = static_cast<std::int64_t>(record.gaussians);
+  status.rss_bytes = static_cast<std::int64_t>(run.results.rss_bytes.back());
+  status.lost = lost;
+  return status;
+}
+
+/// Scan by scan until there are no more, a signal comes, or the disk is full.
+Result<void> FeedScans(Prepared& run, RunLog& log, Progress& progress) {
+  std::int64_t fed = 0;
+  std::int64_t lost = 0;
+  while (!Interrupted()) {
+    std::optional<Scan> scan = run.feed->Next();
+    NoteProblems(*run.feed, progress, run.results);
+    if (!scan) break;
+    ++fed;
+    const std::optional<ScanRecord> record = run.system->Process(*scan);
+    if (!record) {
+      ++run.results.without_pose;
+      continue;
+    }
+    lost += record->state == TrackState::kLost;
+    const std::int64_t rss_bytes = ReadMemoryUse().rss_bytes;
+    if (const Result<void> written = log.Append(*record, rss_bytes); !written) return written;
+    run.results.records.push_back(*record);
+    run.results.rss_bytes.push_back(static_cast<double>(rss_bytes));
+    progress.Update(StatusOf(run, fed, lost));
+  }
+  run.results.feed = run.feed->Counts();
+  run.results.interrupted = Interrupted();
+  return log.Close();
+}
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+Result<void> Track(Prepared& run, bool quiet) {
+  Result<RunLog> log = RunLog::Open(run.folder);
+  if (!log) return Forward(log);
+  Progress::Options options;
+  options.quiet = quiet;
+  Progress progress(options);
+  const auto start = std::chrono::steady_clock::now();
+  if (const Result<void> fed = FeedScans(run, *log, progress); !fed) return fed;
+  run.results.feed_s = SecondsSince(start);
+  const auto end = std::chrono::steady_clock::now();
+  run.system->Finish();
+  run.results.finish_s = SecondsSince(end);
+  return {};
+}
+
+Result<void> CheckUsable(const RunResults& results) {
+  if (results.interrupted || results.gaussians > 0) return {};
+  const std::string folder = results.recording.string();
+  if (results.without_pose > 0 && results.records.empty()) {
+    return Fail(ErrorCode::kInput, "{}: no scan has a pose at its time", folder);
+  }
+  if (results.records.empty()) {
+    return Fail(ErrorCode::kInput, "{}: not one scan could be used", folder);
+  }
+  return Fail(ErrorCode::kInput,
+              "{}: none of the {} scans has points to make a map of; see "
+              "preprocess.min_range_m and max_range_m",
+              folder,
+              results.records.size());
+}
+
+}  // namespace
+
+ExitCode RunSlam(const RunRequest& original) {
+  RunRequest request = original;
+  Result<Prepared> run = Prepare(request);
+  if (!run) return ReportError(run.error());
+  DescribeRun(request, run->results);
+  const std::string config_yaml = DumpYaml(request.config);
+  if (!request.quiet) {
+    fmt::print("recording   {}: {}\nsensor      {}\n",
+               request.recording.string(),
+               run->results.source,
+               run->results.sensor_verdict);
+    std::fflush(stdout);
+  }
+  const Result<void> saved = WriteFileAtomically(run->folder / "config.yaml", config_yaml);
+  if (!saved) return ReportError(saved.error());
+  if (const auto tracked = Track(*run, request.quiet); !tracked) {
+    return ReportError(tracked.error());
+  }
+  const Result<void> concluded =
+      ConcludeRun(*run->system, request.config, config_yaml, run->folder, run->results);
+  if (!concluded) return ReportError(concluded.error());
+  if (const auto usable = CheckUsable(run->results); !usable) return ReportError(usable.error());
+  if (!request.quiet) {
+    fmt::print(
+        "{}report      {}\n", SummaryText(run->results), (run->folder / "report.html").string());
+  }
+  return run->results.interrupted ? kExitInterrupted : kExitOk;
+}
+
+}  // namespace covsplat

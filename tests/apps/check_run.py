@@ -1,0 +1,350 @@
+"""Runs the binary on small simulated recordings, good and bad, as a user would, and checks exit
+codes, messages and files.
+
+usage: check_run.py COVSPLAT [CASE ...]
+"""
+import json
+import pathlib
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+
+SCANS = 12
+SMALL = ["-s", "lidar.rows=32", "-s", "lidar.columns=256"]
+FILES = ["config.yaml", "frames.csv", "map.ply", "metrics.json", "report.html",
+         "trajectory_kitti.txt", "trajectory_tum.txt"]
+CASES = []
+
+
+def case(function):
+    CASES.append(function)
+    return function
+
+
+class Bench:
+    """A scratch folder with one good recording, and the binary."""
+
+    def __init__(self, binary: str, folder: str):
+        self.binary = binary
+        self.folder = pathlib.Path(folder)
+        self.good = self.folder / "good"
+        call = self.call("simulate", "courtyard", "-o", self.good, "-n", str(SCANS), *SMALL)
+        expect(call, 0)
+
+    def call(self, *arguments, **options):
+        return subprocess.run([self.binary, *map(str, arguments)], cwd=self.folder, text=True,
+                              capture_output=True, timeout=300, **options)
+
+    def start(self, *arguments):
+        return subprocess.Popen([self.binary, *map(str, arguments)], cwd=self.folder, text=True,
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+    def run(self, recording, name, *arguments):
+        """`covsplat run` into a fresh folder."""
+        return self.call("run", recording, "-o", self.folder / name, *arguments)
+
+    def copy(self, name):
+        return pathlib.Path(shutil.copytree(self.good, self.folder / name))
+
+    def scan(self, recording, index):
+        return recording / "velodyne" / f"{index:06}.bin"
+
+
+def expect(call, code, out="", err=""):
+    said = f"stdout: {call.stdout}\nstderr: {call.stderr}"
+    assert call.returncode == code, f"exit code {call.returncode} instead of {code}\n{said}"
+    assert out in call.stdout, f"{out!r} is not in stdout\n{said}"
+    assert err in call.stderr, f"{err!r} is not in stderr\n{said}"
+
+
+def poses(folder):
+    """Rows of the TUM file; checks that every line is whole."""
+    text = (folder / "trajectory_tum.txt").read_text()
+    assert text.endswith("\n") or not text, "the last line is cut"
+    rows = [[float(word) for word in line.split()] for line in text.splitlines()]
+    assert all(len(row) == 8 for row in rows), "a line is cut"
+    return rows
+
+
+def metrics(folder):
+    return json.loads((folder / "metrics.json").read_text())
+
+
+def set_points(recording, index, points, times=None):
+    """Replaces a scan by (x, y, z, intensity) rows."""
+    data = b"".join(struct.pack("<4f", *point) for point in points)
+    (recording / "velodyne" / f"{index:06}.bin").write_bytes(data)
+    times = [0.0] * len(points) if times is None else times
+    (recording / "timestamps" / f"{index:06}.bin").write_bytes(
+        struct.pack(f"<{len(times)}f", *times))
+
+
+@case
+def a_good_run_writes_everything(bench):
+    call = bench.run(bench.good, "out")
+    expect(call, 0, out="report.html")
+    out = bench.folder / "out"
+    missing = [name for name in FILES if not (out / name).is_file()]
+    assert not missing, f"not written: {missing}"
+    assert len(poses(out)) == SCANS
+    assert len((out / "trajectory_kitti.txt").read_text().splitlines()) == SCANS
+    assert len((out / "frames.csv").read_text().splitlines()) == SCANS + 1
+    found = metrics(out)
+    assert found["trajectory_error"]["ate_translation_m"]["rmse"] < 0.1, found["trajectory_error"]
+    assert found["scans"]["lost"] == 0
+    expect(bench.call("info", out / "map.ply", "--json"), 0, out='"gaussians"')
+    expect(bench.call("info", out), 0, out="gaussians")
+    expect(bench.call("eval", "traj", out / "trajectory_tum.txt",
+                      bench.good / "groundtruth_tum.txt"), 0, out=f"{SCANS} poses compared")
+
+
+@case
+def the_saved_configuration_gives_the_same_run(bench):
+    expect(bench.run(bench.good, "first", "--deterministic", "--threads", "1"), 0)
+    first = bench.folder / "first"
+    expect(bench.run(bench.good, "again", "-c", first / "config.yaml"), 0, out="as configured")
+    expect(bench.run(bench.good, "other", "--deterministic", "--threads", "2"), 0)
+    for name in ["again", "other"]:
+        for file in ["trajectory_tum.txt", "trajectory_kitti.txt", "map.ply"]:
+            same = (first / file).read_bytes() == (bench.folder / name / file).read_bytes()
+            assert same, f"{file} of {name} differs"
+
+
+@case
+def wrong_requests_are_usage_errors(bench):
+    expect(bench.run(bench.good, "x", "--nonsense"), 2, err="--nonsense")
+    expect(bench.run(bench.good, "x", "-s", "gicp.max_iteration=3"), 2, err="gicp.max_iterations")
+    expect(bench.run(bench.good, "x", "-s", "keyframe.min_overlap=7"), 2, err="0 to 1")
+    expect(bench.run(bench.good, "x", "--format", "las"), 2, err="kitti")
+    expect(bench.run(bench.good, "x", "-s", "sensor.columns=30", "-s",
+                     "sensor.elevation_deg=[10,0,-10]"), 2, err="multiple of 4")
+    expect(bench.run(bench.good, "x", "-s", "sensor.columns=32", "-s",
+                     "sensor.elevation_deg=[0,10]"), 2, err="top beam first")
+    expect(bench.call("simulate", "atlantis", "-o", "x"), 2, err="courtyard")
+    expect(bench.call("simulate", "--list"), 0, out="courtyard")
+    assert not (bench.folder / "x").exists()
+
+
+@case
+def missing_and_empty_folders_are_input_errors(bench):
+    expect(bench.run("no_such_folder", "x"), 3, err="no_such_folder")
+    (bench.folder / "empty").mkdir()
+    expect(bench.run("empty", "x"), 3, err="empty")
+    expect(bench.call("info", "empty"), 3, err="empty")
+    expect(bench.run(bench.good, "x", "--gt", "no_truth.txt"), 3, err="no_truth.txt")
+    expect(bench.run(bench.good, "x", "--first", "500"), 3)
+
+
+@case
+def a_truncated_scan_is_left_out(bench):
+    recording = bench.copy("truncated")
+    file = bench.scan(recording, 5)
+    file.write_bytes(file.read_bytes()[:-7])
+    call = bench.run(recording, "out_truncated")
+    expect(call, 0, err="000005.bin")
+    assert metrics(bench.folder / "out_truncated")["scans"]["damaged"] == 1
+    assert len(poses(bench.folder / "out_truncated")) == SCANS - 1
+
+
+@case
+def only_damaged_scans_are_an_error(bench):
+    recording = bench.copy("all_damaged")
+    for i in range(SCANS):
+        bench.scan(recording, i).write_bytes(b"short")
+    expect(bench.run(recording, "out_all_damaged"), 3, err="not one scan could be used")
+
+
+@case
+def points_that_are_not_finite_do_not_count(bench):
+    recording = bench.copy("nan")
+    nan, inf = float("nan"), float("inf")
+    for i in range(SCANS):
+        file = bench.scan(recording, i)
+        data = bytearray(file.read_bytes())
+        for k in range(0, len(data) // 16, 10):
+            bad = [(nan, nan, nan, 0.0), (inf, 0.0, 0.0, 0.0), (0.0, -inf, nan, 0.0)][k % 3]
+            data[16 * k:16 * k + 16] = struct.pack("<4f", *bad)
+        file.write_bytes(data)
+    expect(bench.run(recording, "out_nan"), 0)
+    found = metrics(bench.folder / "out_nan")
+    assert found["scans"]["lost"] == 0
+    assert found["trajectory_error"]["ate_translation_m"]["rmse"] < 0.1
+
+
+@case
+def empty_scans_keep_their_row(bench):
+    for name, empty in [("empty_middle", [6]), ("empty_start", [0, 1]), ("empty_end", [SCANS - 1])]:
+        recording = bench.copy(name)
+        for i in empty:
+            set_points(recording, i, [])
+        expect(bench.run(recording, "out_" + name), 0)
+        rows = poses(bench.folder / ("out_" + name))
+        assert len(rows) == SCANS, f"{name}: {len(rows)} poses"
+    recording = bench.copy("all_empty")
+    for i in range(SCANS):
+        set_points(recording, i, [])
+    expect(bench.run(recording, "out_all_empty"), 3, err="none of the 12 scans has points")
+
+
+@case
+def one_scan_makes_a_map(bench):
+    expect(bench.run(bench.good, "out_one", "-n", "1"), 0)
+    assert len(poses(bench.folder / "out_one")) == 1
+    assert metrics(bench.folder / "out_one")["map"]["gaussians"] > 100
+
+
+@case
+def time_that_goes_backwards_is_left_out(bench):
+    recording = bench.copy("backwards")
+    times = (recording / "times.txt").read_text().splitlines()
+    times[6] = times[5]  # a driver that repeats a stamp
+    (recording / "times.txt").write_text("\n".join(times) + "\n")
+    expect(bench.run(recording, "out_backwards"), 0, err="not later than")
+    assert metrics(bench.folder / "out_backwards")["scans"]["backwards"] == 1
+    assert len(poses(bench.folder / "out_backwards")) == SCANS - 1
+
+
+@case
+def outputs_that_cannot_be_written_are_output_errors(bench):
+    (bench.folder / "file").write_text("x")
+    expect(bench.run(bench.good, "file/out"), 4, err="cannot make the output folder")
+    expect(bench.call("run", bench.good, "-o", "/proc/covsplat"), 4, err="/proc/covsplat")
+    (bench.folder / "full").mkdir()
+    (bench.folder / "full" / "precious").write_text("x")
+    expect(bench.run(bench.good, "full"), 4, err="--overwrite")
+    assert (bench.folder / "full" / "precious").read_text() == "x"
+
+
+@case
+def a_full_disk_is_an_output_error(bench):
+    for name in ["trajectory_tum.txt", "frames.csv", "map.ply.tmp", "report.html.tmp"]:
+        out = bench.folder / ("full_" + name)
+        out.mkdir()
+        (out / name).symlink_to("/dev/full")
+        call = bench.run(bench.good, out.name, "--overwrite")
+        expect(call, 4, err=f"{name}: cannot be written: No space left on device")
+        written = (out / "trajectory_kitti.txt").read_text().splitlines()
+        if name.endswith(".tmp"):
+            assert len(written) == SCANS
+            assert (out / "metrics.json").is_file()
+
+
+@case
+def interrupted_runs_finish_with_what_there_is(bench):
+    for which in [signal.SIGINT, signal.SIGTERM]:
+        out = bench.folder / f"interrupted_{which}"
+        run = bench.start("run", bench.good, "-o", out, "--realtime")
+        wait_for_poses(out, 3)
+        run.send_signal(which)
+        stdout, stderr = run.communicate(timeout=120)
+        assert run.returncode == 130, f"exit code {run.returncode}\n{stdout}\n{stderr}"
+        assert 3 <= len(poses(out)), "poses are lost"
+        assert all((out / name).is_file() for name in FILES)
+        assert metrics(out)["interrupted"]
+        expect(bench.call("info", out / "map.ply"), 0)
+
+
+@case
+def killed_runs_lose_nothing_that_was_tracked(bench):
+    out = bench.folder / "killed"
+    run = bench.start("run", bench.good, "-o", out, "--realtime")
+    seen = wait_for_poses(out, 3)
+    run.kill()
+    run.wait(timeout=60)
+    rows = poses(out)
+    assert len(rows) >= seen
+    assert (out / "config.yaml").is_file()
+    expect(bench.call("eval", "traj", out / "trajectory_tum.txt",
+                      bench.good / "groundtruth_tum.txt"), 0)
+
+
+def wait_for_poses(out, count):
+    """Until so many poses are written; returns how many there are."""
+    file = out / "trajectory_tum.txt"
+    for _ in range(3000):
+        rows = file.read_text().count("\n") if file.exists() else 0
+        if rows >= count:
+            return rows
+        time.sleep(0.01)
+    raise AssertionError(f"{file}: no {count} poses in time")
+
+
+@case
+def realtime_runs_count_what_they_drop(bench):
+    expect(bench.run(bench.good, "realtime", "--realtime"), 0)
+    scans = metrics(bench.folder / "realtime")["scans"]
+    assert scans["tracked"] + scans["dropped"] == SCANS, scans
+
+
+@case
+def given_poses_are_followed(bench):
+    truth = bench.good / "groundtruth_tum.txt"
+    expect(bench.run(bench.good, "followed", "--poses", truth), 0)
+    error = metrics(bench.folder / "followed")["trajectory_error"]["ate_translation_m"]
+    assert error["max"] < 1e-3, error
+
+
+@case
+def parts_of_a_recording_can_be_run(bench):
+    expect(bench.run(bench.good, "part", "--first", "2", "-j", "2", "-n", "3"), 0)
+    lines = (bench.folder / "part" / "frames.csv").read_text().splitlines()[1:]
+    assert [line.split(",")[0] for line in lines] == ["2", "4", "6"], lines
+
+
+@case
+def info_tells_what_a_recording_is(bench):
+    call = bench.call("info", bench.good, "--json")
+    expect(call, 0)
+    facts = json.loads(call.stdout)
+    assert facts["scans"] == SCANS and facts["ground_truth"].endswith("groundtruth_tum.txt")
+    assert "32 beams" in facts["sensor"], facts["sensor"]
+    assert 0.05 < facts["point_time_span_s"] < 0.11
+    bare = bench.copy("bare")
+    shutil.rmtree(bare / "timestamps")
+    expect(bench.call("info", bare), 0, out="deskew.time_source=azimuth")
+
+
+@case
+def eval_judges_trajectories(bench):
+    truth = bench.good / "groundtruth_tum.txt"
+    expect(bench.call("eval", "traj", truth, truth, "--json"), 0, out='"rmse": 0.0')
+    expect(bench.call("eval", "traj", bench.good / "poses.txt", truth), 2, err="--times")
+    expect(bench.call("eval", "traj", bench.good / "poses.txt", truth, "--times",
+                      bench.good / "times.txt", "--align", "none"), 0)
+    expect(bench.call("eval", "traj", "nothing.txt", truth), 3, err="nothing.txt")
+    expect(bench.call("eval", "traj", truth, truth, "--align", "maybe"), 2, err="maybe")
+
+
+@case
+def the_demo_runs(bench):
+    # Few scans: the demo's sensor has full resolution.
+    expect(bench.call("demo", "-o", "demo", "-n", "4"), 0, out="report.html")
+    assert (bench.folder / "demo" / "recording" / "times.txt").is_file()
+    expect(bench.call("demo", "-o", "demo", "-n", "2"), 4, err="--overwrite")
+    expect(bench.call("demo", "-o", "demo", "-n", "2", "--overwrite"), 0)
+
+
+def main() -> int:
+    binary = str(pathlib.Path(sys.argv[1]).resolve())
+    wanted = sys.argv[2:]
+    failed = 0
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(binary, folder)
+        for check in CASES:
+            if wanted and check.__name__ not in wanted:
+                continue
+            try:
+                check(bench)
+                print(f"ok      {check.__name__}", flush=True)
+            except (AssertionError, OSError, subprocess.TimeoutExpired, KeyError) as error:
+                failed += 1
+                print(f"FAILED  {check.__name__}: {error!r}", flush=True)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
