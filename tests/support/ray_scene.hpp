@@ -27,6 +27,8 @@ class RayScene {
  public:
   explicit RayScene(std::vector<Box> boxes) : boxes_(std::move(boxes)) {}
 
+  void Add(const Box& box) { boxes_.push_back(box); }
+
   /// Distance along a unit ray to the first surface, infinity if there is none.
   double Cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) const {
     double nearest = kInfinity;

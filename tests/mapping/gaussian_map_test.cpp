@@ -1,0 +1,177 @@
+#include "covsplat/mapping/gaussian_map.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "tests/splat/scenes.hpp"
+#include "tests/support/mapping_fixtures.hpp"
+#include <gtest/gtest.h>
+
+namespace covsplat::test {
+namespace {
+
+constexpr double kOpaque = 0.8;
+constexpr double kTransparent = 0.02;
+constexpr double kPruneOpacity = 0.05;
+
+/// Gaussians that carry their own number everywhere: in the mean and in all signals. Every third is
+/// too transparent to stay.
+SpawnedGaussians Tagged(int first, int count) {
+  SpawnedGaussians spawned;
+  spawned.gaussians.Resize(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    const int tag = first + i;
+    const double opacity = tag % 3 == 0 ? kTransparent : kOpaque;
+    SetGaussian(spawned.gaussians,
+                static_cast<std::size_t>(i),
+                {static_cast<double>(tag), 0.0, 0.0},
+                Eigen::Quaterniond::Identity(),
+                0.1,
+                0.1,
+                opacity);
+    spawned.confidence.push_back(1e-3f * static_cast<float>(tag));
+    spawned.control_score.push_back(static_cast<float>(-tag));
+  }
+  return spawned;
+}
+
+/// One Gaussian at each of some places in the keyframe's frame.
+SpawnedGaussians GaussiansAt(const std::vector<Eigen::Vector3d>& places) {
+  SpawnedGaussians spawned;
+  spawned.gaussians.Resize(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    SetGaussian(spawned.gaussians, i, places[i], Eigen::Quaterniond::Identity(), 0.1, 0.1, kOpaque);
+  }
+  spawned.confidence.assign(places.size(), 1.0f);
+  spawned.control_score.assign(places.size(), 0.0f);
+  return spawned;
+}
+
+/// A keyframe that measured the same range in every pixel.
+Keyframe Sphere(const SE3& T_map_sensor, float range_m) {
+  const SensorModel sensor = ReducedSensor();
+  Keyframe keyframe;
+  keyframe.tracked.T_map_sensor = T_map_sensor;
+  keyframe.measurement = {
+      Image<float>(sensor.Rows(), sensor.Columns(), range_m),
+      Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::Zero())};
+  return keyframe;
+}
+
+class GaussianMapTest : public ::testing::Test {
+ protected:
+  int Add(int first, int count) {
+    return map_.AddKeyframe(Sphere(SE3(), 5.0f), Tagged(first, count));
+  }
+
+  void ExpectAlignedRows() {
+    for (const AnchorRange& range : map_.Engine().Ranges()) {
+      for (std::size_t i = range.begin; i < range.end; ++i) {
+        const float tag = map_.Engine().Gaussians().Column(kMeanX)[i];
+        EXPECT_EQ(map_.Signals().confidence[i], 1e-3f * tag);
+        EXPECT_EQ(map_.Signals().control_score[i], -tag);
+        EXPECT_EQ(map_.Signals().last_seen[i], range.anchor);
+        EXPECT_EQ(map_.Signals().trackable[i], 1);
+        for (int p = 0; p < kParameterCount; ++p) {
+          EXPECT_EQ(map_.AsSpawned().Column(p)[i], map_.Engine().Gaussians().Column(p)[i]);
+        }
+      }
+    }
+    EXPECT_EQ(map_.AsSpawned().Size(), map_.Engine().Gaussians().Size());
+    EXPECT_EQ(map_.Signals().confidence.size(), map_.Engine().Gaussians().Size());
+  }
+
+  int LastSeen(std::size_t row) const { return map_.Signals().last_seen[row]; }
+
+  ThreadPool pool_{2};
+  const SensorModel sensor_ = ReducedSensor();
+  GaussianMap map_{std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value())};
+};
+
+TEST_F(GaussianMapTest, KeepsSignalsWithTheirGaussiansThroughAddingAndPruning) {
+  EXPECT_EQ(Add(1, 5), 0);  // numbers that are no multiples of the block size
+  EXPECT_EQ(Add(6, 37), 1);
+  EXPECT_EQ(Add(43, 18), 2);
+  EXPECT_EQ(map_.Size(), 60u);
+  ExpectAlignedRows();
+  EXPECT_EQ(map_.PruneOpacity(kPruneOpacity), 20u);
+  EXPECT_EQ(map_.Size(), 40u);
+  ExpectAlignedRows();
+  EXPECT_EQ(Add(61, 30), 3);
+  ExpectAlignedRows();
+  EXPECT_EQ(map_.PruneOpacity(kPruneOpacity), 10u);
+  EXPECT_EQ(map_.PruneOpacity(kPruneOpacity), 0u);
+  EXPECT_EQ(map_.Size(), 60u);
+  ExpectAlignedRows();
+}
+
+TEST_F(GaussianMapTest, MarksPaddingAsNotTrackable) {
+  Add(1, 5);
+  ASSERT_EQ(map_.Engine().Gaussians().Size(), kBlockSize);
+  for (std::size_t i = 5; i < kBlockSize; ++i) EXPECT_EQ(map_.Signals().trackable[i], 0);
+}
+
+TEST_F(GaussianMapTest, KeepsAKeyframeThatSpawnsNothingOrLosesAllItsGaussians) {
+  EXPECT_EQ(Add(1, 0), 0);
+  EXPECT_EQ(Add(3, 1), 1);  // too transparent
+  EXPECT_EQ(Add(4, 1), 2);
+  EXPECT_EQ(map_.PruneOpacity(kPruneOpacity), 1u);
+  EXPECT_EQ(map_.Keyframes(), 3);
+  EXPECT_EQ(map_.Size(), 1u);
+  ExpectAlignedRows();
+}
+
+TEST_F(GaussianMapTest, PrunesGaussiansThatAreNoLongerFinite) {
+  SpawnedGaussians spawned = Tagged(1, 2);
+  SpawnedGaussians broken = GaussiansAt(std::vector<Eigen::Vector3d>(kParameterCount, {1, 2, 3}));
+  for (int p = 0; p < kParameterCount; ++p) {
+    broken.gaussians.Column(p)[p] = p % 2 == 0 ? std::numeric_limits<float>::quiet_NaN()
+                                               : std::numeric_limits<float>::infinity();
+  }
+  map_.AddKeyframe(Sphere(SE3(), 5.0f), broken);
+  map_.AddKeyframe(Sphere(SE3(), 5.0f), spawned);
+  map_.MarkSeen(1, Sphere(SE3(), 5.0f), sensor_);  // must survive them
+  EXPECT_EQ(map_.PruneOpacity(kPruneOpacity), static_cast<std::size_t>(kParameterCount));
+  EXPECT_EQ(map_.Size(), 2u);
+  EXPECT_EQ(map_.Engine().Gaussians().Column(kMeanX)[0], 1.0f);
+}
+
+TEST_F(GaussianMapTest, MarksAsSeenOnlyWhatAKeyframeMeasuresInItsPlace) {
+  const SE3 first = MakePose(0, 0, 0.5, 10, -4, 1);
+  map_.AddKeyframe(Sphere(first, 5.0f), GaussiansAt({{5, 0, 0}, {0, 5, 0}, {8, 0, 0}, {3, 0, 0}}));
+  // 1 m on and turned half round: only the first Gaussian is 4 m away.
+  const SE3 second = first * MakePose(0, 0, std::numbers::pi, 1, 0, 0);
+  const Keyframe keyframe = Sphere(second, 4.0f);
+  const int number = map_.AddKeyframe(keyframe, {});
+  map_.MarkSeen(number, keyframe, sensor_);
+  EXPECT_EQ(LastSeen(0), 1);
+  EXPECT_EQ(LastSeen(1), 0);
+  EXPECT_EQ(LastSeen(2), 0);
+  EXPECT_EQ(LastSeen(3), 0);
+}
+
+TEST_F(GaussianMapTest, FindsMeansAroundAPoseInItsFrame) {
+  const SE3 keyframe = MakePose(0, 0, 0.5, 1000, -400, 1);
+  map_.AddKeyframe(Sphere(keyframe, 5.0f), GaussiansAt({{5, 0, 0}, {0, 15, 0}}));
+  const SE3 pose = keyframe * MakePose(0, 0, std::numbers::pi, 1, 0, 0);
+  const std::vector<Eigen::Vector3f> means = map_.MeansNear(pose, 10.0);
+  ASSERT_EQ(means.size(), 1u);  // no padding, nothing from farther away
+  EXPECT_LT((means[0] - Eigen::Vector3f(-4, 0, 0)).norm(), 1e-5f);
+  EXPECT_TRUE(map_.MeansNear(SE3(), 10.0).empty());
+}
+
+TEST_F(GaussianMapTest, DoesNotMarkAsSeenWhatIsBehindAGapOrOutOfView) {
+  map_.AddKeyframe(Sphere(SE3(), 5.0f), GaussiansAt({{5, 0, 0}, {0.1, 0, 5}}));
+  map_.AddKeyframe(Sphere(SE3(), 0.0f), {});
+  map_.MarkSeen(1, Sphere(SE3(), 0.0f), sensor_);  // no returns at all
+  map_.MarkSeen(1, Sphere(SE3(), 4.7f), sensor_);  // something in front, beyond the tolerance
+  EXPECT_EQ(LastSeen(0), 0);
+  map_.MarkSeen(1, Sphere(SE3(), 4.9f), sensor_);  // within 10 cm + 2 %
+  EXPECT_EQ(LastSeen(0), 1);
+  EXPECT_EQ(LastSeen(1), 0) << "nearly straight above";
+}
+
+}  // namespace
+}  // namespace covsplat::test

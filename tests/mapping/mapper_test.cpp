@@ -1,0 +1,144 @@
+#include "covsplat/mapping/mapper.hpp"
+
+#include <cstring>
+#include <utility>
+
+#include "tests/support/mapping_fixtures.hpp"
+#include <gtest/gtest.h>
+
+namespace covsplat::test {
+namespace {
+
+constexpr double kNoise = 0.02;
+constexpr int kKeyframes = kSanitized ? 3 : 6;
+
+SE3 PoseOfKeyframe(int k) { return MakePose(0.0, 0.0, 0.3 * k, 0.8 * k - 2.0, 0.2 * k, 0.05 * k); }
+
+MapperConfig Frozen() {
+  MapperConfig config;
+  config.enabled = false;
+  return config;
+}
+
+class MapperTest : public ::testing::Test {
+ protected:
+  std::unique_ptr<Mapper> MakeMapper(const MapperConfig& config = {}) {
+    auto engine = std::move(MakeSplatEngine(Backend::kCpu, sensor_, config.engine, pool_).value());
+    return std::make_unique<Mapper>(std::move(engine), sensor_, config);
+  }
+  Keyframe KeyframeAt(int k) {
+    return StillKeyframe(
+        Room(), sensor_, PoseOfKeyframe(k), kNoise, static_cast<std::uint64_t>(k), pool_);
+  }
+  std::unique_ptr<Mapper> MapTheRoom(const MapperConfig& config) {
+    auto mapper = MakeMapper(config);
+    for (int k = 0; k < kKeyframes; ++k) {
+      mapper->Insert(KeyframeAt(k));
+      mapper->OptimizeNewest();
+    }
+    return mapper;
+  }
+  /// Against the truth, from a pose between the keyframes.
+  double HeldOutError(Mapper& mapper) {
+    const SE3 pose = MakePose(0.02, -0.02, 1.0, -1.2, 0.6, 0.1);
+    return MeanRangeError(mapper.Render(pose).range_m, TrueRanges(Room(), sensor_, pose));
+  }
+
+  const SensorModel sensor_ = ReducedSensor();
+  ThreadPool pool_{2};
+};
+
+TEST_F(MapperTest, OptimisingMakesTheMapBetterWhereItWasNotMeasured) {
+  const auto optimised = MapTheRoom({});
+  const auto as_spawned = MapTheRoom(Frozen());
+  const double after = HeldOutError(*optimised);
+  const double before = HeldOutError(*as_spawned);
+  EXPECT_LT(after, 0.9 * before);  // the rest is holes and edges
+  EXPECT_LT(after, 0.15);          // rooms of 24 m x 18 m, 2 cm of noise
+}
+
+TEST_F(MapperTest, LeavesGaussiansAloneWhenItIsDisabled) {
+  MapperConfig config = Frozen();
+  config.schedule.final_steps = 20;
+  const auto mapper = MapTheRoom(config);
+  mapper->OptimizeIdle();
+  mapper->OptimizeFinally();
+  EXPECT_EQ(mapper->Steps(), 0);
+  const GaussianMap& map = mapper->Map();
+  ASSERT_GT(map.Size(), 1000u);
+  for (const AnchorRange& range : map.Engine().Ranges()) {
+    for (int p = 0; p < kParameterCount; ++p) {
+      EXPECT_EQ(std::memcmp(map.Engine().Gaussians().Column(p) + range.begin,
+                            map.AsSpawned().Column(p) + range.begin,
+                            (range.end - range.begin) * sizeof(float)),
+                0);
+    }
+  }
+}
+
+TEST_F(MapperTest, SpendsItsBudgetAndNoMore) {
+  MapperConfig config;
+  config.schedule = {
+      .steps_new = 3, .steps_near = 2, .steps_old = 1, .steps_per_visit = 4, .final_steps = 10};
+  const auto mapper = MakeMapper(config);
+  mapper->OptimizeNewest();
+  mapper->OptimizeIdle();
+  mapper->OptimizeFinally();
+  EXPECT_EQ(mapper->Steps(), 0) << "there is nothing to optimise yet";
+  mapper->Insert(KeyframeAt(0));
+  EXPECT_EQ(mapper->Steps(), 0);
+  mapper->OptimizeNewest();
+  EXPECT_EQ(mapper->Steps(), 6);
+  mapper->OptimizeIdle();
+  EXPECT_EQ(mapper->Steps(), 10);
+  mapper->OptimizeFinally();
+  EXPECT_EQ(mapper->Steps(), 20) << "10 in visits of 4, 4 and 2";
+}
+
+TEST_F(MapperTest, RemembersHowGaussiansWereSpawned) {
+  const auto mapper = MakeMapper();
+  mapper->Insert(KeyframeAt(0));
+  const GaussianColumns<float> before = mapper->Map().Engine().Gaussians();
+  mapper->OptimizeNewest();
+  const GaussianColumns<float>& spawned = mapper->Map().AsSpawned();
+  const GaussianColumns<float>& now = mapper->Map().Engine().Gaussians();
+  const std::size_t bytes = mapper->Map().Size() * sizeof(float);
+  EXPECT_EQ(std::memcmp(spawned.Column(kOpacityLogit), before.Column(kOpacityLogit), bytes), 0);
+  EXPECT_NE(std::memcmp(spawned.Column(kOpacityLogit), now.Column(kOpacityLogit), bytes), 0);
+}
+
+TEST_F(MapperTest, PrunesWhatHasBecomeTransparentEveryFewKeyframes) {
+  MapperConfig config = Frozen();
+  config.prune_opacity = 0.5;
+  config.prune_interval = 2;
+  const auto mapper = MakeMapper(config);
+  mapper->Insert(KeyframeAt(0));
+  const std::size_t all = mapper->Map().Size();
+  const auto transparent = [&] {
+    std::size_t count = 0;
+    const GaussianMap& map = mapper->Map();
+    for (const AnchorRange& range : map.Engine().Ranges()) {
+      for (std::size_t i = range.begin; i < range.end; ++i) {
+        count += map.Engine().Gaussians().Column(kOpacityLogit)[i] < 0.0f;
+      }
+    }
+    return count;
+  };
+  ASSERT_GT(transparent(), 0u);
+  mapper->Insert(KeyframeAt(0));
+  EXPECT_EQ(transparent(), 0u);
+  EXPECT_LT(mapper->Map().Size(), all);
+}
+
+TEST_F(MapperTest, MakesTargetsOfRisingRevision) {
+  const auto mapper = MakeMapper();
+  EXPECT_EQ(mapper->MakeTarget(SE3())->Size(), 0u);
+  mapper->Insert(KeyframeAt(0));
+  const auto first = mapper->MakeTarget(PoseOfKeyframe(0));
+  const auto second = mapper->MakeTarget(PoseOfKeyframe(0));
+  EXPECT_GT(second->Revision(), first->Revision());
+  EXPECT_EQ(first->Size(), mapper->Map().Size());
+}
+
+}  // namespace
+}  // namespace covsplat::test

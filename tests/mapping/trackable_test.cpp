@@ -1,0 +1,198 @@
+#include "covsplat/mapping/trackable.hpp"
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "tests/splat/scenes.hpp"
+#include "tests/support/mapping_fixtures.hpp"
+#include <gtest/gtest.h>
+
+namespace covsplat::test {
+namespace {
+
+constexpr double kReach = 50.0;
+
+struct Surfel {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  double scale_u = 0.1;
+  double scale_v = 0.1;
+  double opacity = 0.8;
+  float confidence = 1.0f;
+};
+
+SpawnedGaussians Spawned(const std::vector<Surfel>& surfels) {
+  SpawnedGaussians spawned;
+  spawned.gaussians.Resize(surfels.size());
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    const Surfel& s = surfels[i];
+    SetGaussian(spawned.gaussians, i, s.mean, s.q, s.scale_u, s.scale_v, s.opacity);
+    spawned.confidence.push_back(s.confidence);
+    spawned.control_score.push_back(0.0f);
+  }
+  return spawned;
+}
+
+Keyframe Blind(const SE3& T_map_sensor) {
+  const SensorModel sensor = ReducedSensor();
+  Keyframe keyframe;
+  keyframe.tracked.T_map_sensor = T_map_sensor;
+  keyframe.measurement = {
+      Image<float>(sensor.Rows(), sensor.Columns(), 0.0f),
+      Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::Zero())};
+  return keyframe;
+}
+
+class BuildTargetTest : public ::testing::Test {
+ protected:
+  void Add(const std::vector<Surfel>& surfels, const SE3& T_map_keyframe = SE3()) {
+    map_.AddKeyframe(Blind(T_map_keyframe), Spawned(surfels));
+  }
+  std::shared_ptr<const RegistrationTarget> Build(const TrackableConfig& config = {},
+                                                  const SE3& T_map_sensor = SE3()) {
+    return BuildTarget(map_, T_map_sensor, kReach, 1, config);
+  }
+  /// The record of the Gaussian that was the `index`-th to be added.
+  static const RegistrationTarget::Record& RecordOf(const RegistrationTarget& target, int index) {
+    int slot = 0;
+    while (target.SurfelOf(slot) != index) ++slot;
+    return target.At(slot);
+  }
+
+  ThreadPool pool_{2};
+  GaussianMap map_{std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value())};
+};
+
+TEST_F(BuildTargetTest, OfAnEmptyMapIsEmpty) { EXPECT_EQ(Build()->Size(), 0u); }
+
+TEST_F(BuildTargetTest, LeavesOutPadding) {
+  Add({{}, {}, {}});
+  EXPECT_EQ(Build()->Size(), 3u);
+}
+
+TEST_F(BuildTargetTest, LeavesOutWhatIsTooTransparent) {
+  Add({{.mean = {1, 0, 0}, .opacity = 0.29}, {.mean = {2, 0, 0}, .opacity = 0.31}});
+  const auto target = Build({.min_opacity = 0.3});
+  ASSERT_EQ(target->Size(), 1u);
+  EXPECT_EQ(target->At(0).mean.x(), 2.0f);
+}
+
+TEST_F(BuildTargetTest, LeavesOutWhatIsTooUncertain) {
+  // gamma = opacity * confidence
+  Add({{.mean = {1, 0, 0}, .opacity = 0.8, .confidence = 0.36f},
+       {.mean = {2, 0, 0}, .opacity = 0.8, .confidence = 0.39f}});
+  EXPECT_EQ(Build({.min_confidence = 0.0})->Size(), 2u);
+  const auto target = Build({.min_confidence = 0.3});
+  ASSERT_EQ(target->Size(), 1u);
+  EXPECT_EQ(target->At(0).mean.x(), 2.0f);
+}
+
+TEST_F(BuildTargetTest, LeavesOutWhatHasNotBeenSeenForLong) {
+  Add({{.mean = {5, 0, 0}}, {.mean = {0, 5, 0}}});
+  Add({{.mean = {0, -5, 0}}});
+  Add({});
+  const TrackableConfig one_keyframe{.max_keyframe_age = 1};
+  ASSERT_EQ(Build(one_keyframe)->Size(), 1u);
+  EXPECT_EQ(Build(one_keyframe)->At(0).mean.y(), -5.0f);
+  EXPECT_EQ(Build({.max_keyframe_age = 2})->Size(), 3u);
+  // Seeing a Gaussian again keeps it.
+  const SensorModel sensor = ReducedSensor();
+  Keyframe ahead = Blind(SE3());
+  for (int row = 0; row < sensor.Rows(); ++row) {
+    ahead.measurement.range_m(row, sensor.Columns() / 2) = 5.0f;
+  }
+  map_.MarkSeen(2, ahead, sensor);
+  EXPECT_EQ(Build(one_keyframe)->Size(), 2u);
+}
+
+TEST_F(BuildTargetTest, ReachesAroundThePose) {
+  Add({{.mean = {kReach - 1, 0, 0}}, {.mean = {kReach + 1, 0, 0}}});
+  EXPECT_EQ(Build()->Size(), 1u);
+  EXPECT_EQ(Build({}, MakePose(0, 0, 0, 20, 0, 0))->Size(), 2u);
+  EXPECT_EQ(Build({}, MakePose(0, 0, 0, 500, 0, 0))->Size(), 0u);
+}
+
+TEST_F(BuildTargetTest, IsInTheMapFrame) {
+  const SE3 T_map_keyframe = MakePose(0.2, -0.3, 1.0, 4, 5, 6);
+  const Surfel surfel{.mean = {3, -2, 1}, .q = MakePose(0.4, 0.5, 0.6, 0, 0, 0).Rotation()};
+  Add({surfel}, T_map_keyframe);
+  const auto target = Build({}, MakePose(0, 0, 0, 2.4, 3.4, 0));
+  ASSERT_EQ(target->Size(), 1u);
+  EXPECT_EQ(target->OriginMap(), Eigen::Vector3d(2, 3, 0));
+  const Eigen::Vector3d mean = target->OriginMap() + target->At(0).mean.cast<double>();
+  EXPECT_LT((mean - T_map_keyframe * surfel.mean).norm(), 1e-5);
+  const Eigen::Vector3d normal = T_map_keyframe.Rotation() * (surfel.q * Eigen::Vector3d::UnitZ());
+  EXPECT_LT((target->At(0).normal.cast<double>() - normal).norm(), 1e-5);
+}
+
+TEST_F(BuildTargetTest, IsAsPreciseFarFromTheOriginAsNearIt) {
+  std::vector<Surfel> surfels;
+  Rng rng(7);
+  for (int i = 0; i < 50; ++i) {
+    surfels.push_back({.mean = {rng.Uniform(-20, 20), rng.Uniform(-20, 20), rng.Uniform(-2, 5)}});
+  }
+  const Eigen::Vector3d far_away(4000, -3000, 7);  // 5 km
+  const SE3 near = MakePose(0.01, 0.02, 2.0, 0.3, -0.2, 0.1);
+  const SE3 far(near.Rotation(), near.Translation() + far_away);
+  Add(surfels, near);
+  const auto at_home = Build({}, near);
+  GaussianMap remote(std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()));
+  remote.AddKeyframe(Blind(far), Spawned(surfels));
+  const auto abroad = BuildTarget(remote, far, kReach, 1, {});
+  ASSERT_EQ(at_home->Size(), surfels.size());
+  ASSERT_EQ(abroad->Size(), surfels.size());
+  EXPECT_EQ(abroad->OriginMap() - at_home->OriginMap(), far_away);
+  for (int i = 0; i < static_cast<int>(surfels.size()); ++i) {
+    EXPECT_LT((RecordOf(*abroad, i).mean - RecordOf(*at_home, i).mean).norm(), 1e-3f);
+  }
+}
+
+TEST_F(BuildTargetTest, WeighsRoundGaussiansMoreThanNeedles) {
+  std::vector<Surfel> surfels;
+  for (int i = 0; i < 40; ++i) {
+    surfels.push_back({.mean = {0.5 * i, 0, 0}, .scale_u = i % 2 == 0 ? 0.1 : 0.5});
+  }
+  Add(surfels);
+  const auto target = Build();
+  ASSERT_EQ(target->Size(), surfels.size());
+  // Paper eq. 5: w_max = 10 at the least curvature, 1 at the largest.
+  EXPECT_FLOAT_EQ(RecordOf(*target, 0).planar_weight, 10.0f);
+  EXPECT_NEAR(RecordOf(*target, 1).planar_weight, 1.0f, 0.01f);
+}
+
+TEST_F(BuildTargetTest, WeighsMatchesByGammaIfAsked) {
+  Add({{.opacity = 0.5, .confidence = 0.6f}, {.mean = {1, 0, 0}, .confidence = 0.0f}});
+  EXPECT_NEAR(RecordOf(*Build(), 0).confidence, 0.3f, 1e-6f);
+  EXPECT_GT(RecordOf(*Build(), 1).confidence, 0.0f) << "no Gaussian is without any weight";
+  EXPECT_EQ(RecordOf(*Build({.weight_by_confidence = false}), 0).confidence, 1.0f);
+}
+
+TEST_F(BuildTargetTest, TakesCovariancesFromTheGaussianAloneWhateverIsAroundIt) {
+  const Surfel surfel{
+      .mean = {2, 1, 0}, .q = MakePose(0.4, 0.5, 0.6, 0, 0, 0).Rotation(), .scale_u = 0.3};
+  Add({surfel});
+  const auto alone = Build();
+  std::vector<Surfel> crowd;
+  Rng rng(9);
+  for (int i = 0; i < 100; ++i) {
+    crowd.push_back({.mean = surfel.mean + 0.2 * Eigen::Vector3d(rng.Normal(), rng.Normal(), 0),
+                     .scale_u = rng.Uniform(0.05, 0.5)});
+  }
+  Add(crowd);
+  const auto crowded = Build();
+  ASSERT_EQ(crowded->Size(), 101u);
+  EXPECT_EQ(RecordOf(*crowded, 0).covariance, RecordOf(*alone, 0).covariance);
+  const Eigen::Matrix<float, 6, 1> expected =
+      SurfaceCovariance(surfel.q.toRotationMatrix().cast<float>(), 0.3f, 0.1f);
+  EXPECT_LT((RecordOf(*alone, 0).covariance - expected).norm(), 1e-4f * expected.norm());
+}
+
+TEST_F(BuildTargetTest, LeavesOutGaussiansThatAreNoLongerFinite) {
+  Add({{.mean = {std::nan(""), 0, 0}}, {.opacity = std::nan("")}, {.mean = {1, 0, 0}}});
+  ASSERT_EQ(Build()->Size(), 1u);
+  EXPECT_EQ(Build()->At(0).mean.x(), 1.0f);
+}
+
+}  // namespace
+}  // namespace covsplat::test
