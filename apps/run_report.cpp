@@ -183,9 +183,7 @@ ReportData ReportOf(const SlamSystem& system,
                     const std::string& config_yaml,
                     const RunResults& results) {
   ReportData data;
-  const std::filesystem::path folder = std::filesystem::absolute(results.recording);
-  const std::filesystem::path name = folder.lexically_normal();
-  data.title = (name.has_filename() ? name : name.parent_path()).filename().string();
+  data.title = results.title;
   data.subtitle = fmt::format("{}, {}", results.source, TodayAsText());
   data.summary = SummaryOf(results);
   AddTrajectory(system, results, data);

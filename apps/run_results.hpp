@@ -33,6 +33,7 @@ struct MapPicture {
 
 struct RunResults {
   std::filesystem::path recording;
+  std::string title;   ///< of the report
   std::string source;  ///< what the recording is
   std::string command_line;
   std::string sensor_verdict;

@@ -70,9 +70,16 @@ Result<Prepared> Prepare(RunRequest& request) {
   return run;
 }
 
+/// The last part of a path that has one.
+std::string NameOf(const std::filesystem::path& folder) {
+  const std::filesystem::path path = std::filesystem::absolute(folder).lexically_normal();
+  return (path.has_filename() ? path : path.parent_path()).filename().string();
+}
+
 void DescribeRun(const RunRequest& request, RunResults& results) {
   const SystemConfig& system = request.config.slam.system;
   results.recording = request.recording;
+  results.title = request.title.empty() ? NameOf(request.recording) : request.title;
   results.command_line = request.command_line;
   results.threads = system.threads > 0 ? system.threads : CpuCount();
   for (const auto& [value, name] : EnumNames<Schedule>::kNames) {

@@ -13,6 +13,7 @@ namespace covsplat {
 
 struct RunRequest {
   std::filesystem::path recording;
+  std::string title;  ///< of the report; empty: the name of the recording
   RunFolderRequest folder;
   AppConfig config;
   std::int64_t first_scan = 0;

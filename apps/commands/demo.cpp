@@ -39,6 +39,7 @@ ExitCode RunDemo(const DemoOptions& options) {
 
   RunRequest run;
   run.recording = simulate.folder;
+  run.title = "covsplat demo";
   run.folder = {*made, true};
   run.config = std::move(*config);
   run.quiet = options.quiet;

@@ -10,7 +10,7 @@ namespace covsplat {
 namespace {
 
 constexpr int kOversampling = 2;
-constexpr double kDiscSigmas = 1.6;
+constexpr double kDiscSigmas = 1.4;
 constexpr double kMinRadiusPx = 0.8;
 constexpr float kNothing = -std::numeric_limits<float>::infinity();
 constexpr Rgb kPathColor{255, 72, 60};
@@ -72,12 +72,21 @@ Frame FitFrame(const SavedMap& map, std::span<const Eigen::Vector3d> path, const
   return frame;
 }
 
-/// The ellipse {d : d^T inverse d <= 1} of a disc in the picture.
+/// A disc in the picture: the ellipse {d : d^T inverse d <= 1}, and how its depth changes over it.
 struct Ellipse {
   Eigen::Vector2d center;
   Eigen::Matrix2d inverse;
   Eigen::Vector2d reach;
+  Eigen::Vector2d slope;  ///< m of depth per pixel
 };
+
+/// Depth over a disc that is seen from its side would change without limit.
+Eigen::Vector2d SlopeOf(const Eigen::Vector3d& normal, double px_per_m) {
+  constexpr double kSteepest = 3.0;
+  const Eigen::Vector2d slope(-normal.x(), normal.y());
+  const double scale = std::max(normal.z(), slope.norm() / kSteepest);
+  return slope / (scale * px_per_m);
+}
 
 Ellipse Project(const SavedMap& map,
                 std::size_t i,
@@ -90,7 +99,10 @@ Ellipse Project(const SavedMap& map,
   const Eigen::Vector2d b = v * Eigen::Vector2d(axes(0, 1), -axes(1, 1));
   const Eigen::Matrix2d shape = a * a.transpose() + b * b.transpose() +
                                 kMinRadiusPx * kMinRadiusPx * Eigen::Matrix2d::Identity();
-  return {f.Pixel(mean), shape.inverse(), shape.diagonal().cwiseSqrt()};
+  return {f.Pixel(mean),
+          shape.inverse(),
+          shape.diagonal().cwiseSqrt(),
+          SlopeOf(axes.col(2), f.px_per_m)};
 }
 
 void DrawDisc(const Ellipse& e, float depth, float height, float shade, Canvas& canvas) {
@@ -102,8 +114,9 @@ void DrawDisc(const Ellipse& e, float depth, float height, float shade, Canvas& 
   for (int i = top; i < bottom; ++i) {
     for (int j = left; j < right; ++j) {
       const Eigen::Vector2d d = Eigen::Vector2d(j + 0.5, i + 0.5) - e.center;
-      if (depth <= canvas.depth(i, j) || d.dot(e.inverse * d) > 1.0) continue;
-      canvas.depth(i, j) = depth;
+      const float here = depth + static_cast<float>(e.slope.dot(d));
+      if (here <= canvas.depth(i, j) || d.dot(e.inverse * d) > 1.0) continue;
+      canvas.depth(i, j) = here;
       canvas.height(i, j) = height;
       canvas.shade(i, j) = shade;
     }

@@ -1,0 +1,90 @@
+#include "apps/scan_feed.hpp"
+
+#include <chrono>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+namespace covsplat {
+namespace {
+
+/// One scan per stamp; a negative stamp is a scan that cannot be read.
+class FakeSource : public ScanSource {
+ public:
+  explicit FakeSource(std::vector<double> stamps) : stamps_(std::move(stamps)) {}
+
+  Result<std::optional<Scan>> Next() override {
+    if (next_ == stamps_.size()) return std::optional<Scan>();
+    Scan scan;
+    scan.index = static_cast<std::int64_t>(next_);
+    scan.stamp_s = stamps_[next_++];
+    if (scan.stamp_s < 0.0) return Fail(ErrorCode::kInput, "scan {}: is damaged", scan.index);
+    return scan;
+  }
+  std::int64_t ScanCount() const override { return static_cast<std::int64_t>(stamps_.size()); }
+  std::string Description() const override { return "fake"; }
+
+ private:
+  std::vector<double> stamps_;
+  std::size_t next_ = 0;
+};
+
+std::unique_ptr<ScanFeed> FeedOf(std::vector<double> stamps, std::int64_t jump = 1) {
+  return MakeFeed(std::make_unique<FakeSource>(std::move(stamps)), jump, [] { return false; });
+}
+
+std::vector<std::int64_t> Drain(ScanFeed& feed) {
+  std::vector<std::int64_t> scans;
+  while (const std::optional<Scan> scan = feed.Next()) scans.push_back(scan->index);
+  return scans;
+}
+
+TEST(ScanFeedTest, LeavesOutDamagedScansAndThoseThatAreNotLater) {
+  const auto feed = FeedOf({0.0, 0.1, -1.0, 0.05, 0.1, 0.2});
+  EXPECT_EQ(Drain(*feed), (std::vector<std::int64_t>{0, 1, 5}));
+  EXPECT_EQ(feed->Counts().damaged, 1);
+  EXPECT_EQ(feed->Counts().backwards, 2);
+  const std::vector<FeedProblem> problems = feed->TakeProblems();
+  ASSERT_EQ(problems.size(), 3u);
+  EXPECT_NE(problems[0].text.find("is damaged"), std::string::npos);
+  EXPECT_EQ(problems[1].scan, 3);
+  EXPECT_TRUE(feed->TakeProblems().empty());
+}
+
+TEST(ScanFeedTest, JumpCountsAllScans) {
+  const auto feed = FeedOf({0.0, 0.1, 0.2, -1.0, 0.4, 0.5, 0.6}, 3);
+  EXPECT_EQ(Drain(*feed), (std::vector<std::int64_t>{0, 6}));
+  EXPECT_EQ(feed->Counts().damaged, 1);
+}
+
+TEST(ScanFeedTest, StopEndsIt) {
+  const auto feed =
+      MakeFeed(std::make_unique<FakeSource>(std::vector{0.0, 0.1}), 1, [] { return true; });
+  EXPECT_FALSE(feed->Next());
+}
+
+TEST(ScanFeedTest, RealtimeKeepsTheNewestScanAndCountsTheOthers) {
+  std::vector<double> stamps;
+  for (int i = 0; i < 40; ++i) stamps.push_back(0.01 * i);
+  const auto feed = MakeRealtimeFeed(FeedOf(stamps), [] { return false; });
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<std::int64_t> scans;
+  while (const std::optional<Scan> scan = feed->Next()) {
+    scans.push_back(scan->index);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  EXPECT_GE(took.count(), 0.39);
+  EXPECT_EQ(scans.back(), 39);
+  EXPECT_TRUE(std::is_sorted(scans.begin(), scans.end()));
+  EXPECT_GT(feed->Counts().dropped, 10);
+  EXPECT_EQ(feed->Counts().dropped + static_cast<std::int64_t>(scans.size()), 40);
+}
+
+TEST(ScanFeedTest, RealtimeCanBeAbandoned) {
+  const auto feed = MakeRealtimeFeed(FeedOf({0.0, 1000.0}), [] { return false; });
+  EXPECT_TRUE(feed->Next());
+}
+
+}  // namespace
+}  // namespace covsplat
