@@ -8,7 +8,6 @@ find_package(CLI11 2.1 REQUIRED)
 find_package(nlohmann_json 3.11 REQUIRED)
 find_package(PNG REQUIRED)
 find_package(tl-expected 1.0 REQUIRED)
-find_package(nanoflann 1.4 REQUIRED)
 find_package(embree 3 REQUIRED)
 
 find_package(hwy REQUIRED)
