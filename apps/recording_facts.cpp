@@ -46,7 +46,7 @@ PointFacts Look(const std::vector<Scan>& scans) {
   return facts;
 }
 
-double Rounded(double value) { return std::round(value * 1e4) * 1e-4; }
+double Rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
 /// First and last stamp; the last scan may be damaged, then fewer are looked at.
 void AddTime(const std::filesystem::path& folder,
