@@ -164,11 +164,13 @@ void SlamSystem::MaybeHoldOut(const TrackResult& result) {
 
 void SlamSystem::Finish() {
   if (std::exchange(finished_, true)) return;
+  StageTimes last_times;
   if (std::optional<TrackedScan> only = tracker_.TakePendingFirst()) {
-    HandOver(std::move(*only), &mapper_times_);
+    HandOver(std::move(*only), &last_times);
   }
   keyframes_.Close();
   if (mapper_thread_.joinable()) mapper_thread_.join();
+  AddTimes(mapper_times_, last_times);
   mapper_.OptimizeFinally();
   AddTimes(mapper_times_, mapper_.TakeTimes());
   gaussians_ = mapper_.Map().Size();

@@ -110,8 +110,12 @@ Tracker::Prepared Tracker::Prepare(const Scan& scan,
 
 MotionPrediction Tracker::Predict(const ScanTiming& timing) const {
   if (!has_motion_) return {};
-  return PredictMotion(
-      motion_, last_duration_s_, timing.duration_s, timing.mid_stamp_s - last_stamp_s_);
+  const double gap_s = timing.mid_stamp_s - last_stamp_s_;
+  MotionPrediction prediction = PredictMotion(motion_, last_duration_s_, timing.duration_s, gap_s);
+  if (last_duration_s_ > 0.0 && timing.duration_s > 0.0) return prediction;
+  // A scan taken at once has no motion within it: go on as between the last two.
+  prediction.motion.T_map_sensor = motion_.T_map_sensor * SE3::Exp(gap_s * velocity_);
+  return prediction;
 }
 
 // Until a map exists the first scan is the target. How it moved is only known once the second is
@@ -196,18 +200,21 @@ void Tracker::Conclude(const Scan& scan,
   const ScopedTimer timer(result.times, "deskew");
   result.tracked = Deskewed(scan, prepared, motion, result.align.squared_distance);
   result.overlap = Overlap(result.align.squared_distance, config_.keyframe.overlap_distance_m);
+  const double gap_s = prepared.timing.mid_stamp_s - last_stamp_s_;
+  if (has_motion_ && gap_s > 0.0 && result.state == TrackState::kTracking) {
+    velocity_ = (motion_.T_map_sensor.Inverse() * motion.T_map_sensor).Log() / gap_s;
+  }
   motion_ = motion;
   has_motion_ = true;
   last_stamp_s_ = prepared.timing.mid_stamp_s;
   last_duration_s_ = prepared.timing.duration_s;
   ++scans_since_keyframe_;
   if (result.state == TrackState::kLost) {
-    ++scans_lost_;
+    velocity_ *= 0.5;
     motion_.twist *= 0.5;  // a blind prediction is trusted less with every scan
     motion_.acceleration.setZero();
     return;
   }
-  scans_lost_ = 0;
   result.is_keyframe = WantsKeyframe(motion.T_map_sensor, result.overlap);
   if (result.is_keyframe) {
     T_map_keyframe_ = motion.T_map_sensor;

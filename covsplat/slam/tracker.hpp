@@ -47,7 +47,6 @@ struct RecoveryConfig {
 
 struct TrackerConfig {
   DeskewConfig deskew;
-  bool refine_deskew = true;
   PreprocessConfig preprocess;
   GicpConfig gicp;
   RecoveryConfig recovery;
@@ -126,7 +125,7 @@ class Tracker {
   ScanMotion motion_;  ///< of the last scan
   double last_stamp_s_ = 0.0;
   double last_duration_s_ = 0.0;
-  int scans_lost_ = 0;  ///< in a row
+  Vector6d velocity_ = Vector6d::Zero();  ///< per second, from the last two tracked scans
 
   std::optional<SE3> T_map_keyframe_;  ///< of the last keyframe
   int scans_since_keyframe_ = 0;
