@@ -115,8 +115,7 @@ void AddEvents(const RunResults& results, ReportData& data) {
     if (!weak && r.degenerate_directions > 0) {
       events.push_back({Level::kInfo,
                         r.scan,
-                        fmt::format("{} direction(s) of motion cannot be seen from here and keep "
-                                    "the prediction",
+                        fmt::format("{} direction(s) of motion can hardly be seen from here",
                                     r.degenerate_directions)});
     }
     lost = r.state == TrackState::kLost;

@@ -15,7 +15,7 @@ MotionPrediction WalkPrediction() {
   MotionPrediction prediction;
   prediction.motion.twist = (before.Inverse() * HandheldWalk(kStamp)).Log();
   prediction.motion.T_map_sensor = HandheldWalk(kStamp) * MakePose(0.01, 0.01, 0.02, 0.05, 0, 0);
-  prediction.sigma_scale = 3.0;
+  prediction.horizon_s = 0.3;
   return prediction;
 }
 

@@ -29,6 +29,14 @@ int Unknowns(MotionModel model, double duration_s) {
   return model == MotionModel::kVelocity ? 12 : 18;
 }
 
+// The prediction may be off by what accelerations do within its horizon.
+double Gate(const MotionPrediction& prediction, const GicpConfig& config) {
+  constexpr double kSigmas = 3.0;
+  const double horizon_s = std::max(prediction.horizon_s, 0.0);
+  const double off_m = 0.5 * config.linear_acceleration_mps2 * horizon_s * horizon_s;
+  return config.max_correspondence_m + std::min(kSigmas * off_m, config.max_correspondence_m);
+}
+
 ScanMotion Moved(const ScanMotion& motion, const Vector18d& step) {
   return {motion.T_map_sensor * SE3::Exp(step.head<6>()),
           motion.twist + step.segment<6>(6),
@@ -51,7 +59,7 @@ class Aligner {
         prior_(prediction, source.duration_s, config),
         residuals_(source,
                    target,
-                   config.max_correspondence_m,
+                   Gate(prediction, config),
                    config.inlier_distance_m,
                    config.planar_weight,
                    pool) {
@@ -84,7 +92,7 @@ class Aligner {
     while (moments.matches >= kMinMatches && result_.iterations < config_.max_iterations) {
       ++result_.iterations;
       widening_ = std::max(1.0, 0.5 * widening_);
-      const Vector18d step = Solve(moments, result_.motion);
+      const Vector18d step = Solve(moments, result_.motion, stride);
       if (!step.allFinite()) break;
       const ScanMotion candidate = Moved(result_.motion, step);
       const PhaseMoments next = Evaluate(candidate, stride);
@@ -111,20 +119,26 @@ class Aligner {
     return moments;
   }
 
-  // Data and prior, both in units of the residuals' variance, with weak directions tied down.
-  Vector18d Solve(const PhaseMoments& moments, const ScanMotion& motion) {
+  // Data and prior, both in units of their variance, with directions that hold nothing tied down.
+  Vector18d Solve(const PhaseMoments& moments, const ScanMotion& motion, std::size_t stride) {
     NormalEquations equations = Assemble(moments, motion);
-    const double variance = std::max(moments.weighted_square / moments.kernel_sum, 1e-30);
+    const double alike =
+        std::max(1.0, config_.points_per_measurement / static_cast<double>(stride));
+    const double variance = std::max(alike * moments.weighted_square / moments.kernel_sum, 1e-30);
     equations.hessian /= variance;
     equations.gradient /= variance;
     const Eigen::Matrix3d R = motion.T_map_sensor.RotationMatrix();
-    weak_ = FindWeakDirections(equations.hessian.topLeftCorner<6, 6>(),
-                               moments.lever[0] / variance,
-                               R.transpose() * moments.Inertia() * R / variance,
-                               config_.degeneracy_ratio);
+    const auto weaker_than = [&](double ratio) {
+      return FindWeakDirections(equations.hessian.topLeftCorner<6, 6>(),
+                                moments.lever[0] / variance,
+                                R.transpose() * moments.Inertia() * R / variance,
+                                ratio);
+    };
+    weak_ = weaker_than(config_.degeneracy_ratio);
+    const WeakDirections held = weaker_than(config_.hold_ratio);
     information_ = equations.hessian;
-    prior_.AddTo(equations, motion, 1.0);
-    HoldWeakDirections(equations, motion);
+    prior_.AddTo(equations, motion);
+    Hold(held, equations, motion);
     equations.hessian.diagonal() *= 1.0 + damping_;
     Vector18d step = Vector18d::Zero();
     step.head(unknowns_) = equations.hessian.topLeftCorner(unknowns_, unknowns_)
@@ -133,7 +147,9 @@ class Aligner {
     return step;
   }
 
-  void HoldWeakDirections(NormalEquations& equations, const ScanMotion& motion) const {
+  void Hold(const WeakDirections& held,
+            NormalEquations& equations,
+            const ScanMotion& motion) const {
     constexpr double kStiff = 1e6;
     Vector18d offset;
     offset << (predicted_.T_map_sensor.Inverse() * motion.T_map_sensor).Log(),
@@ -145,14 +161,19 @@ class Aligner {
       equations.gradient.segment<3>(at) += stiffness * along * direction;
     };
     for (int block = 0; block < 18; block += 6) {
-      for (const Eigen::Vector3d& direction : weak_.rotations) hold(direction, block);
-      for (const Eigen::Vector3d& direction : weak_.translations) hold(direction, block + 3);
+      for (const Eigen::Vector3d& direction : held.rotations) hold(direction, block);
+      for (const Eigen::Vector3d& direction : held.translations) hold(direction, block + 3);
     }
   }
 
+  // At the scan's begin, middle and end: the motion within it converges last.
   bool IsSmall(const Vector18d& step, double tolerance) const {
-    return step.head<3>().norm() < tolerance * config_.rotation_epsilon_rad &&
-           step.segment<3>(3).norm() < tolerance * config_.translation_epsilon_m;
+    for (const double s : {-0.5, 0.0, 0.5}) {
+      const Vector6d moved = step.head<6>() + s * step.segment<6>(6) + 0.5 * s * s * step.tail<6>();
+      if (moved.head<3>().norm() >= tolerance * config_.rotation_epsilon_rad) return false;
+      if (moved.tail<3>().norm() >= tolerance * config_.translation_epsilon_m) return false;
+    }
+    return true;
   }
 
   AlignResult Finish(const PhaseMoments& moments) {
@@ -177,7 +198,7 @@ class Aligner {
     const int inner = unknowns_ - 6;
     if (inner == 0) return information_.topLeftCorner<6, 6>();
     NormalEquations prior{Matrix18d::Zero(), Vector18d::Zero()};
-    prior_.AddTo(prior, result_.motion, 1.0);
+    prior_.AddTo(prior, result_.motion);
     const Eigen::MatrixXd within = information_.block(6, 6, inner, inner) +
                                    prior.hessian.block(6, 6, inner, inner) +
                                    1e-9 * Eigen::MatrixXd::Identity(inner, inner);

@@ -32,30 +32,31 @@ struct EnumNames<MotionModel> {
 
 struct GicpConfig {
   double max_correspondence_m = 1.0;
-  int max_iterations = 30;
+  int max_iterations = 100;
   double rotation_epsilon_rad = 5e-5;
   double translation_epsilon_m = 2e-4;
   double kernel_width = 2.0;
   bool planar_weight = true;
   double inlier_distance_m = 0.1;
   double degeneracy_ratio = 0.02;
+  double hold_ratio = 0.002;
   MotionModel motion_model = MotionModel::kAcceleration;
   double angular_acceleration_radps2 = 8.0;
   double linear_acceleration_mps2 = 4.0;
-  double begin_rotation_rad = 5e-4;
-  double begin_translation_m = 2e-3;
+  double points_per_measurement = 8.0;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
     v.Field("max_correspondence_m",
             c.max_correspondence_m,
             Range{0.01, 20.0},
-            "match points to surfels nearer than this");
+            "match points to surfels nearer than this, and up to twice as far where the prediction "
+            "reaches far ahead");
     v.Field("max_iterations", c.max_iterations, Range{1, 200}, "Gauss-Newton steps at most");
     v.Field("rotation_epsilon_rad",
             c.rotation_epsilon_rad,
             Range{0.0, 1.0},
-            "converged when a step turns less than this");
+            "converged when a step turns the sensor, at any time of the scan, less than this");
     v.Field("translation_epsilon_m",
             c.translation_epsilon_m,
             Range{0.0, 1.0},
@@ -73,7 +74,11 @@ struct GicpConfig {
             c.degeneracy_ratio,
             Range{0.0, 1.0},
             "directions with less than this share of the information that surfaces facing every "
-            "way would give keep the prediction");
+            "way would give are reported as degenerate; the motion prior weighs the more in them");
+    v.Field("hold_ratio",
+            c.hold_ratio,
+            Range{0.0, 1.0},
+            "... and with less than this share they keep the prediction");
     v.Field("motion_model", c.motion_model, "what to estimate of the motion within a scan");
     v.Field("angular_acceleration_radps2",
             c.angular_acceleration_radps2,
@@ -83,14 +88,10 @@ struct GicpConfig {
             c.linear_acceleration_mps2,
             Range{0.01, 1000.0},
             "motion prior: standard deviation of the linear acceleration");
-    v.Field("begin_rotation_rad",
-            c.begin_rotation_rad,
-            Range{1e-5, 10.0},
-            "motion prior: rotation between the end of a scan and the begin of the next");
-    v.Field("begin_translation_m",
-            c.begin_translation_m,
-            Range{1e-5, 100.0},
-            "motion prior: translation between the end of a scan and the begin of the next");
+    v.Field("points_per_measurement",
+            c.points_per_measurement,
+            Range{1.0, 10000.0},
+            "neighbouring points err alike: so many count as one measurement against the prior");
   }
 };
 
@@ -99,8 +100,8 @@ struct GicpConfig {
 struct AlignResult {
   ScanMotion motion;
   /// Of the pose at mid scan, with the motion within the scan marginalised out. Right perturbation
-  /// [rad, m], in 1/rad^2 and 1/m^2, from the residuals' own variance; it takes matches as
-  /// independent and the map as perfect, so it is an upper bound.
+  /// [rad, m], in 1/rad^2 and 1/m^2, from the residuals' own variance and
+  /// `points_per_measurement`; it takes the map as perfect.
   Matrix6d information = Matrix6d::Zero();
   int iterations = 0;
   bool converged = false;
@@ -110,7 +111,7 @@ struct AlignResult {
   std::vector<float> squared_distance;  ///< [source] to the nearest surfel's mean, inf if unmatched
   std::vector<int> surfel;              ///< [source] the nearest surfel's index, -1 if unmatched
 
-  /// Directions of the mid pose that the scan does not determine; they keep the prediction.
+  /// Directions of the mid pose that the scan hardly determines.
   int degenerate_directions = 0;
   std::vector<Eigen::Vector3d> weak_rotations;     ///< unit axes, sensor frame at mid scan
   std::vector<Eigen::Vector3d> weak_translations;  ///< unit directions, sensor frame at mid scan

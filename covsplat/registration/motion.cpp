@@ -1,18 +1,8 @@
 #include "covsplat/registration/motion.hpp"
 
-#include <algorithm>
-
 #include "covsplat/core/check.hpp"
 
 namespace covsplat {
-namespace {
-
-// Share of the acceleration that is expected to last into the next scan. A gait of 1.5 Hz seen at
-// 10 Hz has an autocorrelation of cos(0.94) = 0.59 from scan to scan.
-constexpr double kAccelerationLasts = 0.5;
-
-}  // namespace
-
 MotionPrediction PredictMotion(const ScanMotion& previous,
                                double previous_duration_s,
                                double duration_s,
@@ -20,20 +10,15 @@ MotionPrediction PredictMotion(const ScanMotion& previous,
   MotionPrediction prediction;
   if (!(previous_duration_s > 0.0 && duration_s > 0.0 && gap_s > 0.0)) {
     prediction.motion.T_map_sensor = previous.T_map_sensor;
-    prediction.sigma_scale = 0.0;
     return prediction;
   }
   // Units of the previous scan's duration, counted from that scan's end.
   const double length = duration_s / previous_duration_s;
   const double middle = gap_s / previous_duration_s - 0.5;
   const Vector6d end_velocity = previous.twist + 0.5 * previous.acceleration;
-  const Vector6d acceleration = kAccelerationLasts * previous.acceleration;
-  prediction.motion.T_map_sensor =
-      previous.At(0.5) *
-      SE3::Exp(middle * end_velocity + 0.5 * middle * std::min(middle, 1.0) * acceleration);
-  prediction.motion.twist = length * (end_velocity + std::min(middle, 1.0) * acceleration);
-  prediction.motion.acceleration = length * length * acceleration;
-  prediction.sigma_scale = std::max(1.0, middle + 0.5);
+  prediction.motion.T_map_sensor = previous.At(0.5) * SE3::Exp(middle * end_velocity);
+  prediction.motion.twist = length * end_velocity;
+  prediction.horizon_s = gap_s;
   return prediction;
 }
 

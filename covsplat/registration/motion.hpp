@@ -34,13 +34,14 @@ struct ScanMotion {
 /// A motion expected before looking at the scan.
 struct MotionPrediction {
   ScanMotion motion;
-  /// Multiplies the standard deviations of the motion prior: 1 for a prediction from a scan that
-  /// was just tracked, more after a gap, 0 or less for "no idea" (the prior is switched off).
-  double sigma_scale = 1.0;
+  /// How far it reaches beyond what is known: from the middle of the last tracked scan to the
+  /// middle of this one. 0 or less for "no idea" (the motion prior is switched off).
+  double horizon_s = 0.0;
 };
 
-/// Continues a motion over `gap_s` from the middle of one scan to the middle of the next. Velocity
-/// is kept, acceleration fades: handheld motion has turned around within a few scans.
+/// Continues a motion over `gap_s` from the middle of one scan to the middle of the next, at the
+/// velocity it ended with. An acceleration that went on from scan to scan would feed on its own
+/// errors.
 MotionPrediction PredictMotion(const ScanMotion& previous,
                                double previous_duration_s,
                                double duration_s,

@@ -1,12 +1,17 @@
 #include "covsplat/registration/motion_prior.hpp"
 
+#include <algorithm>
+
 namespace covsplat {
 namespace {
 
-Vector6d Information(double sigma_rotation, double sigma_translation) {
+// Of a change by the configured accelerations, times `factor` [s^2].
+Vector6d Information(const GicpConfig& config, double factor) {
+  const double rotation = factor * config.angular_acceleration_radps2;
+  const double translation = factor * config.linear_acceleration_mps2;
   Vector6d information;
-  information << Eigen::Vector3d::Constant(1.0 / (sigma_rotation * sigma_rotation)),
-      Eigen::Vector3d::Constant(1.0 / (sigma_translation * sigma_translation));
+  information << Eigen::Vector3d::Constant(1.0 / (rotation * rotation)),
+      Eigen::Vector3d::Constant(1.0 / (translation * translation));
   return information;
 }
 
@@ -26,37 +31,28 @@ void AddSquares(NormalEquations& equations,
 MotionPrior::MotionPrior(const MotionPrediction& prediction,
                          double duration_s,
                          const GicpConfig& config)
-    : predicted_(prediction.motion),
-      active_(config.motion_model != MotionModel::kRigid && prediction.sigma_scale > 0.0 &&
-              duration_s > 0.0) {
-  if (!active_) return;
-  const double scale = prediction.sigma_scale;
-  const double change = scale * duration_s * duration_s;  // of velocity per scan, from acceleration
-  begin_information_ =
-      Information(scale * config.begin_rotation_rad, scale * config.begin_translation_m);
-  velocity_information_ = acceleration_information_ = Information(
-      change * config.angular_acceleration_radps2, change * config.linear_acceleration_mps2);
+    : predicted_(prediction.motion) {
+  const double horizon_s = prediction.horizon_s;
+  if (!(horizon_s > 0.0)) return;
+  pose_information_ = Information(config, 0.5 * horizon_s * horizon_s);
+  if (!(duration_s > 0.0)) return;
+  velocity_information_ = Information(config, std::max(horizon_s, duration_s) * duration_s);
+  acceleration_information_ = Information(config, duration_s * duration_s);
 }
 
-void MotionPrior::AddTo(NormalEquations& equations, const ScanMotion& motion, double factor) const {
-  if (!active_) return;
+void MotionPrior::AddTo(NormalEquations& equations, const ScanMotion& motion) const {
+  const Matrix6d zero = Matrix6d::Zero();
   const Matrix6d identity = Matrix6d::Identity();
-  const SE3 begin = motion.Within(-0.5);
   Jacobian jacobian;
-  jacobian << begin.Inverse().Adjoint(), -0.5 * identity, 0.125 * identity;
-  AddSquares(equations,
-             jacobian,
-             (predicted_.At(-0.5).Inverse() * motion.T_map_sensor * begin).Log(),
-             factor * begin_information_);
-  jacobian << Matrix6d::Zero(), identity, -0.5 * identity;
+  jacobian << identity, zero, zero;
+  const Vector6d moved = (predicted_.T_map_sensor.Inverse() * motion.T_map_sensor).Log();
+  AddSquares(equations, jacobian, moved, pose_information_);
+  jacobian << zero, identity, -0.5 * identity;
   const Vector6d velocity = motion.twist - 0.5 * motion.acceleration;
   const Vector6d predicted_velocity = predicted_.twist - 0.5 * predicted_.acceleration;
-  AddSquares(equations, jacobian, velocity - predicted_velocity, factor * velocity_information_);
-  jacobian << Matrix6d::Zero(), Matrix6d::Zero(), identity;
-  AddSquares(equations,
-             jacobian,
-             motion.acceleration - predicted_.acceleration,
-             factor * acceleration_information_);
+  AddSquares(equations, jacobian, velocity - predicted_velocity, velocity_information_);
+  jacobian << zero, zero, identity;
+  AddSquares(equations, jacobian, motion.acceleration, acceleration_information_);
 }
 
 }  // namespace covsplat

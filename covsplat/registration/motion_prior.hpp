@@ -6,24 +6,23 @@
 
 namespace covsplat {
 
-/// Half the squares, normalised to unit variance, of three differences from the prediction: where
-/// the scan begins (where the previous one ended), how fast the sensor moves then, and how the
-/// velocity changes. A prediction is a continuation, so this ties a scan to the one before without
-/// knowing it. It is silent for the rigid model, whose twist is not estimated. Their standard
-/// deviations are expected accelerations times the scan's duration.
+/// Half the squares, normalised to unit variance, of three differences: of the pose from the
+/// predicted one, of the velocity at the scan's begin from the predicted one, which is that at the
+/// end of the scan before, and of the acceleration from none. Their standard deviations are what
+/// the configured accelerations do within the prediction's horizon, or the scan's duration. Without
+/// a horizon it is silent.
 class MotionPrior {
  public:
   MotionPrior(const MotionPrediction& prediction, double duration_s, const GicpConfig& config);
 
-  /// Adds to equations of `ScanMotion`s near `motion`, scaled by `factor`.
-  void AddTo(NormalEquations& equations, const ScanMotion& motion, double factor) const;
+  /// Adds to equations of `ScanMotion`s near `motion`.
+  void AddTo(NormalEquations& equations, const ScanMotion& motion) const;
 
  private:
   const ScanMotion predicted_;
-  bool active_ = false;
-  Vector6d begin_information_;
-  Vector6d velocity_information_;
-  Vector6d acceleration_information_;
+  Vector6d pose_information_ = Vector6d::Zero();
+  Vector6d velocity_information_ = Vector6d::Zero();
+  Vector6d acceleration_information_ = Vector6d::Zero();
 };
 
 }  // namespace covsplat

@@ -1,6 +1,8 @@
 #include "covsplat/registration/preprocess.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <span>
 
 #include <Eigen/Geometry>
 
@@ -32,6 +34,18 @@ std::vector<int> SelectUsable(const Scan& scan,
     }
   }
   return usable;
+}
+
+VoxelMoments Downsample(std::span<const Eigen::Vector3f> points, const PreprocessConfig& config) {
+  constexpr int kMaxHalvings = 2;
+  const auto enough = static_cast<std::size_t>(config.min_points);
+  auto voxel_m = static_cast<float>(config.downsample_voxel_m);
+  VoxelMoments voxels(points, voxel_m);
+  for (int k = 0; k < kMaxHalvings && voxels.Size() < std::min(enough, points.size()); ++k) {
+    voxel_m *= 0.5f;
+    voxels = VoxelMoments(points, voxel_m);
+  }
+  return voxels;
 }
 
 // Columns along descending variance, in the point's own frame, the last one facing the sensor.
@@ -70,7 +84,7 @@ SourceCloud Preprocess(const Scan& scan,
     }
   });
 
-  const VoxelMoments voxels(deskewed, static_cast<float>(config.downsample_voxel_m));
+  const VoxelMoments voxels = Downsample(deskewed, config);
   const std::size_t n = voxels.Size();
   cloud.points.resize(n);
   cloud.phase.resize(n);

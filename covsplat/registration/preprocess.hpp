@@ -18,6 +18,7 @@ struct PreprocessConfig {
   double min_range_m = 0.5;
   double max_range_m = 100.0;
   double downsample_voxel_m = 0.4;
+  int min_points = 3000;
   int covariance_neighbours = 25;
 
   template <class Self, class V>
@@ -28,6 +29,10 @@ struct PreprocessConfig {
             c.downsample_voxel_m,
             Range{0.02, 10.0},
             "keep one point for each cube of this size");
+    v.Field("min_points",
+            c.min_points,
+            Range{0, 1000000},
+            "halve these cubes, twice at most, while fewer points would be left");
     v.Field("covariance_neighbours",
             c.covariance_neighbours,
             Range{4, 200},

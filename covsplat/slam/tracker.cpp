@@ -12,6 +12,7 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr int kBootstrapRounds = 3;
 constexpr double kMaxPoseGapS = 0.5;
+constexpr std::size_t kSearchPoints = 1500;
 
 /// A deskewed source cloud as the target of the next scan, while there are no Gaussians.
 RegistrationTarget TargetOf(const SourceCloud& source, const ScanMotion& motion) {
@@ -25,6 +26,30 @@ RegistrationTarget TargetOf(const SourceCloud& source, const ScanMotion& motion)
     surfels[i].scale1 = covariance.sigma_m[1];
   }
   return {surfels, Eigen::Vector3d::Zero(), 0};
+}
+
+SourceCloud EveryNth(const SourceCloud& source, std::size_t stride) {
+  SourceCloud part;
+  part.duration_s = source.duration_s;
+  for (std::size_t i = 0; i < source.Size(); i += stride) {
+    part.points.push_back(source.points[i]);
+    part.phase.push_back(source.phase[i]);
+    part.scan_index.push_back(source.scan_index[i]);
+    part.covariance.push_back(source.covariance[i]);
+  }
+  return part;
+}
+
+/// Rotation vectors to begin a search from, none first.
+std::vector<Eigen::Vector3d> SearchTurns(double angle_rad) {
+  std::vector<Eigen::Vector3d> turns = {Eigen::Vector3d::Zero()};
+  for (const double sign : {1.0, -1.0}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      turns.push_back(sign * angle_rad * Eigen::Vector3d::Unit(axis));
+    }
+    turns.push_back(2.0 * sign * angle_rad * Eigen::Vector3d::UnitZ());
+  }
+  return turns;
 }
 
 /// The motion within a scan if the sensor went on evenly from one mid-scan pose to the next.
@@ -112,6 +137,7 @@ MotionPrediction Tracker::Predict(const ScanTiming& timing) const {
   if (!has_motion_) return {};
   const double gap_s = timing.mid_stamp_s - last_stamp_s_;
   MotionPrediction prediction = PredictMotion(motion_, last_duration_s_, timing.duration_s, gap_s);
+  prediction.horizon_s = timing.mid_stamp_s - last_tracked_s_;
   if (last_duration_s_ > 0.0 && timing.duration_s > 0.0) return prediction;
   // A scan taken at once has no motion within it: go on as between the last two.
   prediction.motion.T_map_sensor = motion_.T_map_sensor * SE3::Exp(gap_s * velocity_);
@@ -125,7 +151,6 @@ AlignResult Tracker::Bootstrap(const Prepared& second, TrackResult& result) {
   ScanMotion first_motion;
   AlignResult align;
   MotionPrediction prediction;
-  prediction.sigma_scale = 0.0;
   for (int round = 0; round < kBootstrapRounds; ++round) {
     const RegistrationTarget target = TargetOf(first_->prepared.source, first_motion);
     align = Align(second.source, target, prediction, config_.gicp, pool_);
@@ -149,14 +174,37 @@ AlignResult Tracker::Register(const SourceCloud& source,
                               const MotionPrediction& prediction,
                               double gap_s) {
   AlignResult align = Align(source, target, prediction, config_.gicp, pool_);
-  if (IsPlausible(align, gap_s)) return align;
-  MotionPrediction standstill;
-  standstill.motion.T_map_sensor = motion_.T_map_sensor;
-  standstill.sigma_scale = 0.0;
-  GicpConfig wide = config_.gicp;
-  wide.max_correspondence_m *= config_.recovery.retry_gate_factor;
-  AlignResult retried = Align(source, target, standstill, wide, pool_);
-  return IsPlausible(retried, gap_s) ? retried : align;
+  const double enough = config_.recovery.search_below * usual_inlier_ratio_;
+  if (IsPlausible(align, gap_s) && align.inlier_ratio >= enough) return align;
+  AlignResult found = Search(source, target, gap_s);
+  if (!IsPlausible(found, gap_s)) return align;
+  const bool better = !IsPlausible(align, gap_s) || found.inlier_ratio > align.inlier_ratio;
+  return better ? found : align;
+}
+
+// A part of the scan is registered from standstill and from turns both ways about each axis; the
+// whole scan goes on from where most of that part came to lie on the map.
+AlignResult Tracker::Search(const SourceCloud& source,
+                            const RegistrationTarget& target,
+                            double gap_s) const {
+  GicpConfig gicp = config_.gicp;
+  gicp.max_correspondence_m *= config_.recovery.search_gate_factor;
+  const SourceCloud part =
+      EveryNth(source, std::max<std::size_t>(1, source.Size() / kSearchPoints));
+  MotionPrediction best;
+  best.motion.T_map_sensor = motion_.T_map_sensor;
+  double best_ratio = 0.0;
+  for (const Eigen::Vector3d& turn : SearchTurns(config_.recovery.search_angle_deg * kDegree)) {
+    Vector6d moved = Vector6d::Zero();
+    moved.head<3>() = turn;
+    MotionPrediction guess;
+    guess.motion.T_map_sensor = motion_.T_map_sensor * SE3::Exp(moved);
+    const AlignResult align = Align(part, target, guess, gicp, pool_);
+    if (!IsPlausible(align, gap_s) || align.inlier_ratio <= best_ratio) continue;
+    best_ratio = align.inlier_ratio;
+    best.motion = align.motion;
+  }
+  return Align(source, target, best, gicp, pool_);
 }
 
 bool Tracker::IsPlausible(const AlignResult& align, double gap_s) const {
@@ -215,6 +263,11 @@ void Tracker::Conclude(const Scan& scan,
     motion_.acceleration.setZero();
     return;
   }
+  last_tracked_s_ = last_stamp_s_;
+  constexpr double kForget = 0.1;
+  const double ratio = result.align.inlier_ratio;
+  usual_inlier_ratio_ +=
+      (usual_inlier_ratio_ > 0.0 ? kForget : 1.0) * (ratio - usual_inlier_ratio_);
   result.is_keyframe = WantsKeyframe(motion.T_map_sensor, result.overlap);
   if (result.is_keyframe) {
     T_map_keyframe_ = motion.T_map_sensor;

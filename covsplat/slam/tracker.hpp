@@ -19,10 +19,12 @@ enum class TrackState {
 };
 
 struct RecoveryConfig {
-  double min_inlier_ratio = 0.2;
+  double min_inlier_ratio = 0.25;
   double max_speed_mps = 60.0;
   double max_turn_rate_degps = 720.0;
-  double retry_gate_factor = 2.0;
+  double search_below = 0.75;
+  double search_angle_deg = 15.0;
+  double search_gate_factor = 2.0;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
@@ -38,10 +40,19 @@ struct RecoveryConfig {
             c.max_turn_rate_degps,
             Range{1.0, 36000.0},
             "... or turned faster than this");
-    v.Field("retry_gate_factor",
-            c.retry_gate_factor,
+    v.Field("search_below",
+            c.search_below,
+            Range{0.0, 1.0},
+            "where less of a scan lies on the map than this share of what is usual, the pose is "
+            "searched for around the last one");
+    v.Field("search_angle_deg",
+            c.search_angle_deg,
+            Range{1.0, 90.0},
+            "... by turns of this much about each axis, and twice as much about the vertical one");
+    v.Field("search_gate_factor",
+            c.search_gate_factor,
             Range{1.0, 20.0},
-            "a lost scan is tried once more from standstill with a gate wider by this factor");
+            "... with gicp.max_correspondence_m larger by this factor");
   }
 };
 
@@ -106,6 +117,9 @@ class Tracker {
                        const RegistrationTarget& target,
                        const MotionPrediction& prediction,
                        double gap_s);
+  AlignResult Search(const SourceCloud& source,
+                     const RegistrationTarget& target,
+                     double gap_s) const;
   bool IsPlausible(const AlignResult& align, double gap_s) const;
   TrackedScan Deskewed(const Scan& scan,
                        const Prepared& prepared,
@@ -124,11 +138,13 @@ class Tracker {
   bool has_motion_ = false;
   ScanMotion motion_;  ///< of the last scan
   double last_stamp_s_ = 0.0;
+  double last_tracked_s_ = 0.0;
   double last_duration_s_ = 0.0;
   Vector6d velocity_ = Vector6d::Zero();  ///< per second, from the last two tracked scans
 
   std::optional<SE3> T_map_keyframe_;  ///< of the last keyframe
   int scans_since_keyframe_ = 0;
+  double usual_inlier_ratio_ = 0.0;  ///< mean over the last tracked scans
 };
 
 }  // namespace covsplat

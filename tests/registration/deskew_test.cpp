@@ -111,20 +111,20 @@ TEST(PredictMotion, ContinuesAConstantVelocity) {
   const SE3 expected = motion.T_map_sensor * SE3::Exp(motion.twist);
   EXPECT_LT((expected.Inverse() * next.motion.T_map_sensor).Log().norm(), 1e-12);
   EXPECT_LT((next.motion.twist - motion.twist).norm(), 1e-12);
-  EXPECT_DOUBLE_EQ(next.sigma_scale, 1.0);
+  EXPECT_DOUBLE_EQ(next.horizon_s, 0.1);
   // A lost scan doubles the gap; a shorter scan shortens the twist.
   const MotionPrediction later = PredictMotion(motion, 0.1, 0.05, 0.2);
   const SE3 expected_later = motion.T_map_sensor * SE3::Exp(2.0 * motion.twist);
   EXPECT_LT((expected_later.Inverse() * later.motion.T_map_sensor).Log().norm(), 1e-12);
   EXPECT_LT((later.motion.twist - 0.5 * motion.twist).norm(), 1e-12);
-  EXPECT_GT(later.sigma_scale, 1.0);
+  EXPECT_GT(later.horizon_s, next.horizon_s);
 }
 
 TEST(PredictMotion, KeepsThePoseWhenThereAreNoTimes) {
   const ScanMotion motion{MakePose(0.1, 0.2, 0.3, 1, 2, 3), Vector6d::Ones(), Vector6d::Zero()};
   const MotionPrediction next = PredictMotion(motion, 0.0, 0.1, 0.1);
   EXPECT_EQ(next.motion.T_map_sensor.Matrix(), motion.T_map_sensor.Matrix());
-  EXPECT_EQ(next.sigma_scale, 0.0);
+  EXPECT_EQ(next.horizon_s, 0.0);
 }
 
 }  // namespace

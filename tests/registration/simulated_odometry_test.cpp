@@ -98,7 +98,7 @@ class SimulatedOdometry : public ::testing::Test {
   static MotionPrediction Predict(Mode mode, const SE3&, ScanMotion motion, bool first) {
     if (mode == Mode::kVelocity || mode == Mode::kAcceleration) {
       MotionPrediction next = PredictMotion(motion, kScanPeriod, kScanPeriod, kScanPeriod);
-      if (first) next.sigma_scale = 10.0;
+      if (first) next.horizon_s = 1.0;
       return next;
     }
     // Constant velocity from the last two poses.

@@ -48,7 +48,7 @@ inline SE3 MakePose(double roll, double pitch, double yaw, double x, double y, d
 
 /// The prediction "it is here and at rest", without a motion prior.
 inline MotionPrediction At(const SE3& pose) {
-  return {.motion = {.T_map_sensor = pose}, .sigma_scale = 0.0};
+  return {.motion = {.T_map_sensor = pose}, .horizon_s = 0.0};
 }
 
 inline double RotationError(const SE3& a, const SE3& b) {
