@@ -41,6 +41,12 @@ class BoundedQueue {
     return TakeFront();
   }
 
+  /// Nothing is waiting at this moment.
+  bool Empty() const {
+    const std::scoped_lock lock(mutex_);
+    return items_.empty();
+  }
+
   void Close() {
     const std::scoped_lock lock(mutex_);
     closed_ = true;

@@ -34,7 +34,7 @@ struct Keyframe {
 };
 
 struct KeyframeConfig {
-  double max_distance_m = 1.0;
+  double max_distance_m = 2.0;
   double max_angle_deg = 20.0;
   double min_overlap = 0.8;
   double overlap_distance_m = 0.3;

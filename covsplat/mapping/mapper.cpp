@@ -49,6 +49,10 @@ void Mapper::OptimizeNewest() {
         schedule.steps_old);
 }
 
+void Mapper::OptimizeHurriedly() {
+  if (map_.Keyframes() > 0) Visit(map_.Keyframes() - 1, config_.schedule.steps_hurried);
+}
+
 void Mapper::OptimizeIdle() {
   if (map_.Keyframes() == 0) return;
   const auto all = static_cast<std::uint64_t>(map_.Keyframes());

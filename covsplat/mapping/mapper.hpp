@@ -12,6 +12,7 @@ struct ScheduleConfig {
   int steps_new = 10;
   int steps_near = 10;
   int steps_old = 0;
+  int steps_hurried = 3;
   int steps_per_visit = 10;
   int final_steps = 0;
 
@@ -23,6 +24,10 @@ struct ScheduleConfig {
             Range{0, 10000},
             "... then on one of the keyframes nearest to it");
     v.Field("steps_old", c.steps_old, Range{0, 10000}, "... then on one of all keyframes");
+    v.Field("steps_hurried",
+            c.steps_hurried,
+            Range{0, 10000},
+            "these on the newest instead of all that, while more keyframes wait (threaded only)");
     v.Field("steps_per_visit",
             c.steps_per_visit,
             Range{1, 1000},
@@ -71,6 +76,8 @@ class Mapper {
 
   /// The fixed budget of the newest keyframe: new, near and old views.
   void OptimizeNewest();
+  /// The few steps there is time for while more keyframes wait.
+  void OptimizeHurriedly();
   /// One visit of a view for idle time: the newest ones more often than old ones.
   void OptimizeIdle();
   /// `schedule.final_steps` over all keyframes.

@@ -22,7 +22,7 @@ struct EnumNames<ScaleRule> {
 };
 
 struct SpawnConfig {
-  double voxel_m = 0.2;
+  double voxel_m = 0.3;
   double max_alpha = 0.5;
   double range_tolerance_m = 0.1;
   double range_tolerance_ratio = 0.01;

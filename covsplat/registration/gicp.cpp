@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <utility>
 
@@ -43,6 +44,13 @@ ScanMotion Moved(const ScanMotion& motion, const Vector18d& step) {
           motion.acceleration + step.tail<6>()};
 }
 
+Vector18d Between(const ScanMotion& from, const ScanMotion& to) {
+  Vector18d step;
+  step << (from.T_map_sensor.Inverse() * to.T_map_sensor).Log(), to.twist - from.twist,
+      to.acceleration - from.acceleration;
+  return step;
+}
+
 // One registration: the problem and where its iterations stand.
 class Aligner {
  public:
@@ -80,6 +88,9 @@ class Aligner {
   static constexpr double kMaxDamping = 1e3;
   static constexpr std::size_t kEnoughForCoarse = 4000;
   static constexpr std::size_t kCoarseStride = 4;
+  // Points whose match changes to and fro keep steps from becoming small: so many steps that get
+  // nowhere are the end.
+  static constexpr std::size_t kCycle = 4;
 
   // Gauss-Newton with every `stride`-th point until steps are small (epsilons times `tolerance`).
   PhaseMoments Iterate(std::size_t stride, double tolerance) {
@@ -89,6 +100,7 @@ class Aligner {
     double accepted_median = median_;
     damping_ = 0.0;
     result_.converged = false;
+    std::deque<ScanMotion> recent;
     while (moments.matches >= kMinMatches && result_.iterations < config_.max_iterations) {
       ++result_.iterations;
       widening_ = std::max(1.0, 0.5 * widening_);
@@ -106,7 +118,11 @@ class Aligner {
       moments = next;
       accepted_median = median_;
       damping_ *= 0.1;
-      result_.converged = widening_ == 1.0 && IsSmall(step, tolerance);
+      recent.push_back(candidate);
+      if (recent.size() > kCycle) recent.pop_front();
+      const bool circles =
+          recent.size() == kCycle && IsSmall(Between(recent.front(), candidate), tolerance);
+      result_.converged = widening_ == 1.0 && (circles || IsSmall(step, tolerance));
       if (result_.converged) break;
     }
     return moments;

@@ -85,20 +85,22 @@ SourceCloud Preprocess(const Scan& scan,
   });
 
   const VoxelMoments voxels = Downsample(deskewed, config);
-  const std::size_t n = voxels.Size();
+  const std::size_t n = std::min(voxels.Size(), static_cast<std::size_t>(config.max_points));
   cloud.points.resize(n);
   cloud.phase.resize(n);
   cloud.scan_index.resize(n);
   cloud.covariance.resize(n);
   ParallelFor(pool, n, kGrain / 8, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      const int index = usable[static_cast<std::size_t>(voxels.Representative(v))];
-      cloud.scan_index[v] = index;
-      cloud.points[v] = scan.points[static_cast<std::size_t>(index)];
-      cloud.phase[v] = phase_of(index);
-      cloud.covariance[v] = DescribeSurface(voxels.SurfaceAround(v, config.covariance_neighbours),
-                                            poses.At(cloud.phase[v]).rotation,
-                                            cloud.points[v]);
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::size_t voxel = i * voxels.Size() / n;
+      const int index = usable[static_cast<std::size_t>(voxels.Representative(voxel))];
+      cloud.scan_index[i] = index;
+      cloud.points[i] = scan.points[static_cast<std::size_t>(index)];
+      cloud.phase[i] = phase_of(index);
+      cloud.covariance[i] =
+          DescribeSurface(voxels.SurfaceAround(voxel, config.covariance_neighbours),
+                          poses.At(cloud.phase[i]).rotation,
+                          cloud.points[i]);
     }
   });
   return cloud;

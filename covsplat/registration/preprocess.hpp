@@ -19,6 +19,7 @@ struct PreprocessConfig {
   double max_range_m = 100.0;
   double downsample_voxel_m = 0.4;
   int min_points = 3000;
+  int max_points = 6000;
   int covariance_neighbours = 25;
 
   template <class Self, class V>
@@ -33,6 +34,10 @@ struct PreprocessConfig {
             c.min_points,
             Range{0, 1000000},
             "halve these cubes, twice at most, while fewer points would be left");
+    v.Field("max_points",
+            c.max_points,
+            Range{100, 1000000},
+            "of more points, evenly many are left out of registration");
     v.Field("covariance_neighbours",
             c.covariance_neighbours,
             Range{4, 200},
@@ -65,8 +70,9 @@ struct SourceCloud {
 };
 
 /// Keeps one measured point per voxel, the one nearest to the voxel's centre, in order of the first
-/// measurement in each voxel. Covariances come from *all* measurements around it, brought together
-/// with the predicted motion. `predicted.T_map_sensor` is not used.
+/// measurement in each voxel, and of these at most `max_points`. Covariances come from *all*
+/// measurements around it, brought together with the predicted motion. `predicted.T_map_sensor` is
+/// not used.
 SourceCloud Preprocess(const Scan& scan,
                        const ScanTiming& timing,
                        const ScanMotion& predicted,

@@ -149,7 +149,7 @@ ScanResiduals::ScanResiduals(const SourceCloud& source,
       covariance_(source.Size()),
       slot_(source.Size(), -1),
       squared_distance_(source.Size(), kInfinity),
-      searched_(source.Size(), Eigen::Vector3f::Zero()),
+      searched_(source.Size(), Eigen::Vector3f::Constant(kInfinity)),
       clearance_m_(source.Size(), 0.0f),
       mahalanobis_(source.Size(), kInfinity) {
   COVSPLAT_CHECK(source.phase.size() == source.Size());
@@ -183,9 +183,11 @@ PhaseMoments ScanResiduals::Evaluate(const ScanMotion& motion,
 void ScanResiduals::Match(std::size_t i, const Eigen::Vector3f& position) {
   constexpr float kMargin = 0.1f;     // m
   constexpr float kRounding = 1e-4f;  // m
+  constexpr float kFringe = 0.02f;    // m, by which the gate may be missed
+  const float moved = (position - searched_[i]).norm();
+  if (slot_[i] < 0 && moved < kFringe) return;
   if (slot_[i] >= 0) {
     const float squared = (target_.At(slot_[i]).mean - position).squaredNorm();
-    const float moved = (position - searched_[i]).norm();
     if (squared < squared_gate_ && std::sqrt(squared) + moved + kRounding < clearance_m_[i]) {
       squared_distance_[i] = squared;
       return;

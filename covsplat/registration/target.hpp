@@ -41,7 +41,7 @@ class RegistrationTarget {
   RegistrationTarget(std::span<const TargetSurfel> surfels,
                      const Eigen::Vector3d& origin_map,
                      std::uint64_t revision,
-                     double cell_m = 0.5);
+                     double cell_m = 0.75);
 
   std::size_t Size() const { return records_.size(); }
   const Eigen::Vector3d& OriginMap() const { return origin_map_; }

@@ -120,7 +120,11 @@ void SlamSystem::MapKeyframe(TrackedScan tracked, StageTimes& times) {
     mapper_.Insert(keyframe);
   }
   if (config_.system.schedule == Schedule::kThreaded) PublishTarget();
-  mapper_.OptimizeNewest();
+  if (keyframes_.Empty()) {  // as always in lockstep
+    mapper_.OptimizeNewest();
+  } else {
+    mapper_.OptimizeHurriedly();
+  }
   PublishTarget();
   AddTimes(times, mapper_.TakeTimes());
 }

@@ -140,8 +140,10 @@ TEST_F(SpawnGaussiansTest, LeaveOccupiedVoxelsAloneHoweverBadlyTheyAreExplained)
   const Keyframe keyframe = OnePoint({5.05f, 0.05f, 0.05f}, {0.3f, 0.3f, 0.01f}, 0.0f, pool_);
   const std::vector<Eigen::Vector3f> same_voxel = {{5.15f, 0.15f, 0.15f}};
   const std::vector<Eigen::Vector3f> next_voxel = {{5.25f, 0.15f, 0.15f}};
-  EXPECT_EQ(SpawnGaussians(keyframe, nullptr, same_voxel, sensor_, {}).gaussians.Size(), 0u);
-  EXPECT_EQ(SpawnGaussians(keyframe, nullptr, next_voxel, sensor_, {}).gaussians.Size(), 1u);
+  SpawnConfig config;
+  config.voxel_m = 0.2;
+  EXPECT_EQ(SpawnGaussians(keyframe, nullptr, same_voxel, sensor_, config).gaussians.Size(), 0u);
+  EXPECT_EQ(SpawnGaussians(keyframe, nullptr, next_voxel, sensor_, config).gaussians.Size(), 1u);
 }
 
 TEST_F(SpawnGaussiansTest, CoverWhatHasAppearedAndNothingElse) {
@@ -217,8 +219,8 @@ TEST_F(SpawnGaussiansTest, ScaleByThePapersRule) {
 TEST_F(SpawnGaussiansTest, ScaleBySpacingToHalfWayToTheNeighbours) {
   const Eigen::Vector3f wide(1.0f, 1.0f, 0.01f);
   const auto scales = [&](double range_m) { return ScalesAt(range_m, wide, ScaleRule::kSpacing); };
-  // Near, voxels of 0.2 m are the spacing; farther out it is that of the beams.
-  EXPECT_LT((scales(2.0) - Eigen::Vector2d::Constant(0.1)).norm(), 1e-6);
+  // Near, voxels of 0.3 m are the spacing; farther out it is that of the beams.
+  EXPECT_LT((scales(2.0) - Eigen::Vector2d::Constant(0.15)).norm(), 1e-6);
   EXPECT_LT((scales(8.0) - Eigen::Vector2d::Constant(0.5 * 8.0 * kBeamSpacing)).norm(), 1e-4);
   EXPECT_LT((scales(16.0) - Eigen::Vector2d::Constant(0.5 * 16.0 * kBeamSpacing)).norm(), 1e-4);
 }
