@@ -21,6 +21,7 @@ import numpy as np
 
 import peers
 import report
+import stages
 from covsplat_run import run_covsplat
 from recording import Recording
 from se3 import Trajectory, position_errors
@@ -159,7 +160,7 @@ def errors_of(estimate: Trajectory, recording: Recording) -> np.ndarray:
 
 def write(rows: list[report.Row], about: dict[str, object], options: argparse.Namespace) -> None:
     options.out.mkdir(parents=True, exist_ok=True)
-    text = report.markdown(rows, about)
+    text = report.markdown(rows, about) + stages.markdown(options.out)
     (options.json or options.out / "peers.json").write_text(report.as_json(rows, about))
     (options.out / "peers.md").write_text(text)
     if options.update is not None:
