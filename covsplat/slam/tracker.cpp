@@ -13,6 +13,7 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr int kBootstrapRounds = 3;
 constexpr double kMaxPoseGapS = 0.5;
 constexpr std::size_t kSearchPoints = 1500;
+constexpr int kSearchIterations = 20;
 
 /// A deskewed source cloud as the target of the next scan, while there are no Gaussians.
 RegistrationTarget TargetOf(const SourceCloud& source, const ScanMotion& motion) {
@@ -189,6 +190,8 @@ AlignResult Tracker::Search(const SourceCloud& source,
                             double gap_s) const {
   GicpConfig gicp = config_.gicp;
   gicp.max_correspondence_m *= config_.recovery.search_gate_factor;
+  GicpConfig brief = gicp;
+  brief.max_iterations = std::min(brief.max_iterations, kSearchIterations);
   const SourceCloud part =
       EveryNth(source, std::max<std::size_t>(1, source.Size() / kSearchPoints));
   MotionPrediction best;
@@ -199,7 +202,7 @@ AlignResult Tracker::Search(const SourceCloud& source,
     moved.head<3>() = turn;
     MotionPrediction guess;
     guess.motion.T_map_sensor = motion_.T_map_sensor * SE3::Exp(moved);
-    const AlignResult align = Align(part, target, guess, gicp, pool_);
+    const AlignResult align = Align(part, target, guess, brief, pool_);
     if (!IsPlausible(align, gap_s) || align.inlier_ratio <= best_ratio) continue;
     best_ratio = align.inlier_ratio;
     best.motion = align.motion;

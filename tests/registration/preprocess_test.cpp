@@ -31,6 +31,22 @@ TEST(DecomposeSymmetric, IsProperSortedAndExact) {
   }
 }
 
+TEST(Preprocess, KeepsTheNumberOfPointsWithinItsLimits) {
+  ThreadPool pool(2);
+  const Scan scan = Simulate(Room(), SimulatedSensor(), HandheldWalk, 1.0, 0.02);
+  const auto size = [&](int min_points, int max_points) {
+    PreprocessConfig config;
+    config.min_points = min_points;
+    config.max_points = max_points;
+    return Preprocess(scan, TimeScan(scan, {}), {}, config, pool).Size();
+  };
+  const std::size_t plain = size(0, 1000000);
+  EXPECT_EQ(size(0, 1000), 1000u);
+  const std::size_t finer = size(static_cast<int>(plain) + 1, 1000000);
+  EXPECT_GT(finer, 2 * plain);  // of surfaces: four times as many, where there are enough points
+  EXPECT_LE(size(1000000, 1000000), scan.points.size());
+}
+
 TEST(Preprocess, KeepsOneMeasuredPointPerVoxel) {
   ThreadPool pool(2);
   const Scan scan = Simulate(Room(), SimulatedSensor(), HandheldWalk, 1.0, 0.02);

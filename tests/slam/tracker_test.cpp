@@ -194,6 +194,21 @@ TEST_F(TrackerTest, StartsAtTheSpeedOfACar) {
   ExpectAt(tracker.Track(ScanOf(fast, 1), nullptr), fast(StampOf(1)));
 }
 
+TEST_F(TrackerTest, FindsOutHowItTurnedWhenNothingFitsTheWayItWent) {
+  const auto jolted = [](double t) {
+    return t < StampOf(4) - 0.5 * kScanPeriod ? Still(t) : MakePose(0, 0, 0.9, 0.1, 0, 0);
+  };
+  TrackerConfig blind;
+  blind.recovery.search_below = 0.0;
+  for (const bool searches : {true, false}) {
+    Tracker tracker(searches ? TrackerConfig{} : blind, pool_);
+    TrackFirst(tracker, jolted, 4);
+    const TrackResult result = tracker.Track(InstantScanOf(jolted, 4), &map_);
+    const double off_rad = RotationError(result.tracked.T_map_sensor, jolted(StampOf(4)));
+    EXPECT_EQ(off_rad < kSameRad, searches) << off_rad;
+  }
+}
+
 TEST_F(TrackerTest, IsLostInAnEmptyScanAndRecovers) {
   Tracker tracker({}, pool_);
   TrackFirst(tracker, Drive, 4);
