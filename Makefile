@@ -16,7 +16,9 @@ build-%:
 	@cmake --preset $* >/dev/null
 	@cmake --build --preset $*
 
-demo: setup build-release  ## Simulate a recording, run the SLAM on it, write demo_out/report.html
+demo: setup  ## Simulate a recording, run the SLAM on it, write demo_out/report.html
+	@cmake --preset release >/dev/null
+	@cmake --build --preset release --target covsplat
 	build/release/apps/covsplat demo -o demo_out --overwrite
 
 test: setup build-dev  ## Build with warnings as errors and run every test

@@ -85,7 +85,7 @@ int Mapper::RandomNearKeyframe() {
 
 std::shared_ptr<const RegistrationTarget> Mapper::MakeTarget(const SE3& T_map_sensor) {
   const ScopedTimer timer(times_, "target");
-  return BuildTarget(map_, T_map_sensor, 1.2 * sensor_.MaxRange(), ++revision_, config_.trackable);
+  return BuildTarget(map_, T_map_sensor, 1.2 * sensor_.MaxRange(), config_.trackable);
 }
 
 }  // namespace covsplat

@@ -83,7 +83,7 @@ class Mapper {
   /// `schedule.final_steps` over all keyframes.
   void OptimizeFinally();
 
-  /// The registration target around a pose; each has a higher revision than the last.
+  /// The registration target around a pose.
   std::shared_ptr<const RegistrationTarget> MakeTarget(const SE3& T_map_sensor);
 
   const GaussianMap& Map() const { return map_; }
@@ -103,7 +103,6 @@ class Mapper {
   GaussianMap map_;
   Rng rng_{20250711};
   std::int64_t steps_ = 0;
-  std::uint64_t revision_ = 0;
   StageTimes times_;
 };
 

@@ -49,7 +49,6 @@ void AppendSurfels(const GaussianMap& map,
 std::shared_ptr<const RegistrationTarget> BuildTarget(const GaussianMap& map,
                                                       const SE3& T_map_sensor,
                                                       double reach_m,
-                                                      std::uint64_t revision,
                                                       const TrackableConfig& config) {
   const Eigen::Vector3d origin_map = T_map_sensor.Translation().array().round();
   const SE3 T_origin_map(Eigen::Quaterniond::Identity(), -origin_map);
@@ -59,7 +58,7 @@ std::shared_ptr<const RegistrationTarget> BuildTarget(const GaussianMap& map,
     if (T_origin_anchor.Translation().norm() > 2.0 * reach_m) continue;
     AppendSurfels(map, range, T_origin_anchor, reach_m, config, surfels);
   }
-  return std::make_shared<RegistrationTarget>(surfels, origin_map, revision);
+  return std::make_shared<RegistrationTarget>(surfels, origin_map, map.Keyframes());
 }
 
 }  // namespace covsplat

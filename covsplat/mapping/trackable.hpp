@@ -11,9 +11,9 @@ namespace covsplat {
 
 struct TrackableConfig {
   int max_keyframe_age = 100;
-  double min_opacity = 0.1;
+  double min_opacity = 0.01;
   double min_confidence = 0.0;
-  bool weight_by_confidence = true;
+  bool weight_by_confidence = false;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
@@ -37,7 +37,6 @@ struct TrackableConfig {
 std::shared_ptr<const RegistrationTarget> BuildTarget(const GaussianMap& map,
                                                       const SE3& T_map_sensor,
                                                       double reach_m,
-                                                      std::uint64_t revision,
                                                       const TrackableConfig& config);
 
 }  // namespace covsplat

@@ -88,17 +88,17 @@ std::vector<float> PlanarWeights(std::span<const Eigen::Vector2f> scales) {
 
 RegistrationTarget::RegistrationTarget(std::span<const TargetSurfel> surfels,
                                        const Eigen::Vector3d& origin_map,
-                                       std::uint64_t revision,
+                                       int keyframes,
                                        double cell_m)
-    : RegistrationTarget(surfels, SelectUsable(surfels), origin_map, revision, cell_m) {}
+    : RegistrationTarget(surfels, SelectUsable(surfels), origin_map, keyframes, cell_m) {}
 
 RegistrationTarget::RegistrationTarget(std::span<const TargetSurfel> surfels,
                                        std::vector<int> usable,
                                        const Eigen::Vector3d& origin_map,
-                                       std::uint64_t revision,
+                                       int keyframes,
                                        double cell_m)
     : origin_map_(origin_map),
-      revision_(revision),
+      keyframes_(keyframes),
       index_(Means(surfels, usable), static_cast<float>(cell_m)) {
   std::vector<Eigen::Vector2f> scales;
   scales.reserve(usable.size());

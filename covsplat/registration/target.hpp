@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -40,12 +39,13 @@ class RegistrationTarget {
   RegistrationTarget() : RegistrationTarget({}, Eigen::Vector3d::Zero(), 0) {}
   RegistrationTarget(std::span<const TargetSurfel> surfels,
                      const Eigen::Vector3d& origin_map,
-                     std::uint64_t revision,
+                     int keyframes,
                      double cell_m = 0.75);
 
   std::size_t Size() const { return records_.size(); }
   const Eigen::Vector3d& OriginMap() const { return origin_map_; }
-  std::uint64_t Revision() const { return revision_; }
+  /// So many keyframes the map had when the target was made of it.
+  int Keyframes() const { return keyframes_; }
   const NearestIndex& Index() const { return index_; }
   /// Record in a slot of the index.
   const Record& At(int slot) const { return records_[static_cast<std::size_t>(slot)]; }
@@ -56,11 +56,11 @@ class RegistrationTarget {
   RegistrationTarget(std::span<const TargetSurfel> surfels,
                      std::vector<int> usable,
                      const Eigen::Vector3d& origin_map,
-                     std::uint64_t revision,
+                     int keyframes,
                      double cell_m);
 
   Eigen::Vector3d origin_map_;
-  std::uint64_t revision_;
+  int keyframes_;
   NearestIndex index_;
   std::vector<int> surfel_;      // by slot
   std::vector<Record> records_;  // by slot

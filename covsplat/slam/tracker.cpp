@@ -69,6 +69,7 @@ TrackResult Tracker::Track(const Scan& scan, const RegistrationTarget* target) {
   const MotionPrediction prediction = Predict(timing);
   const Prepared prepared = Prepare(scan, timing, prediction.motion, result);
   const double gap_s = timing.mid_stamp_s - last_stamp_s_;
+  result.keyframes_waiting = KeyframesNotIn(target);
 
   if (!has_motion_ && !first_) {
     if (prepared.source.Size() > 0) first_ = FirstScan{scan, prepared};
@@ -105,6 +106,7 @@ std::optional<TrackResult> Tracker::Follow(const Scan& scan,
   const auto end = PoseAt(poses, timing.mid_stamp_s + half_s, kMaxPoseGapS);
   if (begin && end) motion.twist = (begin->Inverse() * *end).Log();
   const Prepared prepared = Prepare(scan, timing, motion, result);
+  result.keyframes_waiting = KeyframesNotIn(target);
   result.state = TrackState::kTracking;
   result.align.motion = motion;
   result.align.converged = true;
@@ -164,8 +166,7 @@ AlignResult Tracker::Bootstrap(const Prepared& second, TrackResult& result) {
   TrackResult again;
   const Prepared refined = Prepare(first_->scan, first_->prepared.timing, first_motion, again);
   result.first = Deskewed(first_->scan, refined, first_motion, {});
-  T_map_keyframe_ = SE3();
-  scans_since_keyframe_ = 0;
+  CountKeyframe(SE3());
   first_.reset();
   return align;
 }
@@ -271,20 +272,29 @@ void Tracker::Conclude(const Scan& scan,
   const double ratio = result.align.inlier_ratio;
   usual_inlier_ratio_ +=
       (usual_inlier_ratio_ > 0.0 ? kForget : 1.0) * (ratio - usual_inlier_ratio_);
-  result.is_keyframe = WantsKeyframe(motion.T_map_sensor, result.overlap);
-  if (result.is_keyframe) {
-    T_map_keyframe_ = motion.T_map_sensor;
-    scans_since_keyframe_ = 0;
-  }
+  result.is_keyframe = WantsKeyframe(result);
+  if (result.is_keyframe) CountKeyframe(motion.T_map_sensor);
 }
 
-bool Tracker::WantsKeyframe(const SE3& T_map_sensor, double overlap) const {
+// Overlap with a target that lacks a keyframe would ask for that keyframe again.
+bool Tracker::WantsKeyframe(const TrackResult& result) const {
   if (!T_map_keyframe_) return true;
   const KeyframeConfig& policy = config_.keyframe;
-  const Vector6d moved = (T_map_keyframe_->Inverse() * T_map_sensor).Log();
+  const Vector6d moved = (T_map_keyframe_->Inverse() * result.tracked.T_map_sensor).Log();
+  const bool leaves_map = result.keyframes_waiting == 0 && result.overlap < policy.min_overlap;
   return moved.tail<3>().norm() > policy.max_distance_m ||
-         moved.head<3>().norm() > policy.max_angle_deg * kDegree || overlap < policy.min_overlap ||
+         moved.head<3>().norm() > policy.max_angle_deg * kDegree || leaves_map ||
          scans_since_keyframe_ >= policy.max_scans;
+}
+
+void Tracker::CountKeyframe(const SE3& T_map_sensor) {
+  T_map_keyframe_ = T_map_sensor;
+  scans_since_keyframe_ = 0;
+  ++keyframes_;
+}
+
+int Tracker::KeyframesNotIn(const RegistrationTarget* target) const {
+  return std::max(0, keyframes_ - (target != nullptr ? target->Keyframes() : 0));
 }
 
 std::optional<TrackedScan> Tracker::TakePendingFirst() {

@@ -70,6 +70,7 @@ struct TrackResult {
   TrackedScan tracked;  ///< pose (a prediction when lost) and deskewed points
   AlignResult align;    ///< empty unless registered
   double overlap = 0.0;
+  int keyframes_waiting = 0;  ///< keyframes before this scan that the target did not hold yet
   bool is_keyframe = false;
   /// With the second usable scan: the first one again, deskewed with the motion found meanwhile.
   std::optional<TrackedScan> first;
@@ -129,7 +130,9 @@ class Tracker {
                 const Prepared& prepared,
                 const ScanMotion& motion,
                 TrackResult& result);
-  bool WantsKeyframe(const SE3& T_map_sensor, double overlap) const;
+  bool WantsKeyframe(const TrackResult& result) const;
+  void CountKeyframe(const SE3& T_map_sensor);
+  int KeyframesNotIn(const RegistrationTarget* target) const;
 
   const TrackerConfig config_;
   ThreadPool& pool_;
@@ -144,6 +147,7 @@ class Tracker {
 
   std::optional<SE3> T_map_keyframe_;  ///< of the last keyframe
   int scans_since_keyframe_ = 0;
+  int keyframes_ = 0;
   double usual_inlier_ratio_ = 0.0;  ///< mean over the last tracked scans
 };
 

@@ -51,7 +51,7 @@ class BuildTargetTest : public ::testing::Test {
   }
   std::shared_ptr<const RegistrationTarget> Build(const TrackableConfig& config = {},
                                                   const SE3& T_map_sensor = SE3()) {
-    return BuildTarget(map_, T_map_sensor, kReach, 1, config);
+    return BuildTarget(map_, T_map_sensor, kReach, config);
   }
   /// The record of the Gaussian that was the `index`-th to be added.
   static const RegistrationTarget::Record& RecordOf(const RegistrationTarget& target, int index) {
@@ -139,7 +139,7 @@ TEST_F(BuildTargetTest, IsAsPreciseFarFromTheOriginAsNearIt) {
   const auto at_home = Build({}, near);
   GaussianMap remote(std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()));
   remote.AddKeyframe(Blind(far), Spawned(surfels));
-  const auto abroad = BuildTarget(remote, far, kReach, 1, {});
+  const auto abroad = BuildTarget(remote, far, kReach, {});
   ASSERT_EQ(at_home->Size(), surfels.size());
   ASSERT_EQ(abroad->Size(), surfels.size());
   EXPECT_EQ(abroad->OriginMap() - at_home->OriginMap(), far_away);
@@ -163,9 +163,10 @@ TEST_F(BuildTargetTest, WeighsRoundGaussiansMoreThanNeedles) {
 
 TEST_F(BuildTargetTest, WeighsMatchesByGammaIfAsked) {
   Add({{.opacity = 0.5, .confidence = 0.6f}, {.mean = {1, 0, 0}, .confidence = 0.0f}});
-  EXPECT_NEAR(RecordOf(*Build(), 0).confidence, 0.3f, 1e-6f);
-  EXPECT_GT(RecordOf(*Build(), 1).confidence, 0.0f) << "no Gaussian is without any weight";
-  EXPECT_EQ(RecordOf(*Build({.weight_by_confidence = false}), 0).confidence, 1.0f);
+  const auto weighted = Build({.weight_by_confidence = true});
+  EXPECT_NEAR(RecordOf(*weighted, 0).confidence, 0.3f, 1e-6f);
+  EXPECT_GT(RecordOf(*weighted, 1).confidence, 0.0f) << "no Gaussian is without any weight";
+  EXPECT_EQ(RecordOf(*Build(), 0).confidence, 1.0f);
 }
 
 TEST_F(BuildTargetTest, TakesCovariancesFromTheGaussianAloneWhateverIsAroundIt) {

@@ -23,7 +23,7 @@ TEST(RegistrationTarget, HoldsTheCovarianceOfAThinSurfelWhateverTheOrderOfItsSca
                                   {.mean = {2, 0, 0}, .rotation = rotation, .scale1 = 0.0f}};
   const RegistrationTarget target(surfels, Eigen::Vector3d::Zero(), 7);
   ASSERT_EQ(target.Size(), 3u);
-  EXPECT_EQ(target.Revision(), 7u);
+  EXPECT_EQ(target.Keyframes(), 7);
   const Eigen::Matrix3f expected[] = {
       R * Eigen::Vector3f(9.0f, 1.0f, 1e-3f).asDiagonal() * R.transpose(),
       R * Eigen::Vector3f(1.0f, 9.0f, 1e-3f).asDiagonal() * R.transpose(),

@@ -358,11 +358,15 @@ TEST_F(KeyframePolicyTest, WantsOneWhereTheMapEnds) {
   std::copy_if(whole.begin(), whole.end(), std::back_inserter(half), [](const TargetSurfel& s) {
     return s.mean.x() > 0.0f;
   });
-  const RegistrationTarget front(half, Eigen::Vector3d::Zero(), 2);
+  const RegistrationTarget front(half, Eigen::Vector3d::Zero(), 1);
   const TrackResult outside = tracker.Track(ScanOf(Still, 3), &front);
   ExpectAt(outside, SE3());
   EXPECT_LT(outside.overlap, 0.8);
   EXPECT_TRUE(outside.is_keyframe);
+  const TrackResult next = tracker.Track(ScanOf(Still, 4), &front);
+  EXPECT_LT(next.overlap, 0.8);
+  EXPECT_EQ(next.keyframes_waiting, 1);
+  EXPECT_FALSE(next.is_keyframe) << "the keyframe that would fill the gap is on its way";
 }
 
 class FollowTest : public TrackerTest {
