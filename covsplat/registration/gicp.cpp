@@ -154,6 +154,7 @@ class Aligner {
     const WeakDirections held = weaker_than(config_.hold_ratio);
     information_ = equations.hessian;
     prior_.AddTo(equations, motion);
+    posterior_ = equations.hessian;
     Hold(held, equations, motion);
     equations.hessian.diagonal() *= 1.0 + damping_;
     Vector18d step = Vector18d::Zero();
@@ -206,6 +207,7 @@ class Aligner {
     result_.degenerate_directions =
         static_cast<int>(weak_.rotations.size() + weak_.translations.size());
     result_.information = PoseInformation();
+    result_.covariance = Covariance();
     return std::move(result_);
   }
 
@@ -222,6 +224,17 @@ class Aligner {
     return information_.topLeftCorner<6, 6>() - cross * within.ldlt().solve(cross.transpose());
   }
 
+  // Directions that neither data nor prior know of become as good as unknown.
+  Matrix18d Covariance() const {
+    constexpr double kNothing = 1e-6;
+    const Eigen::MatrixXd known = posterior_.topLeftCorner(unknowns_, unknowns_) +
+                                  kNothing * Eigen::MatrixXd::Identity(unknowns_, unknowns_);
+    Matrix18d covariance = Matrix18d::Zero();
+    covariance.topLeftCorner(unknowns_, unknowns_) =
+        known.llt().solve(Eigen::MatrixXd::Identity(unknowns_, unknowns_));
+    return covariance;
+  }
+
   const RegistrationTarget& target_;
   const ScanMotion predicted_;
   const GicpConfig& config_;
@@ -231,7 +244,8 @@ class Aligner {
   ScanResiduals residuals_;
   AlignResult result_;
   WeakDirections weak_;
-  Matrix18d information_ = Matrix18d::Zero();
+  Matrix18d information_ = Matrix18d::Zero();                // of the data
+  Matrix18d posterior_ = Matrix18d::Zero();                  // ... and the prior
   double median_ = std::numeric_limits<double>::infinity();  // of e^T M e, last evaluation
   // The kernel starts wide: the median is that of the most common surface, say the ground, and with
   // a poor prediction everything else would be taken for outliers.

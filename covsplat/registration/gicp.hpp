@@ -103,6 +103,8 @@ struct AlignResult {
   /// [rad, m], in 1/rad^2 and 1/m^2, from the residuals' own variance and
   /// `points_per_measurement`; it takes the map as perfect.
   Matrix6d information = Matrix6d::Zero();
+  /// Of the pose, the twist and the acceleration, from the residuals and the prior.
+  Matrix18d covariance = Matrix18d::Zero();
   int iterations = 0;
   bool converged = false;
   std::size_t correspondences = 0;      ///< source points with a surfel within the gate

@@ -3,10 +3,12 @@
 #include "covsplat/core/check.hpp"
 
 namespace covsplat {
+
 MotionPrediction PredictMotion(const ScanMotion& previous,
                                double previous_duration_s,
                                double duration_s,
-                               double gap_s) {
+                               double gap_s,
+                               const Matrix18d& covariance) {
   MotionPrediction prediction;
   if (!(previous_duration_s > 0.0 && duration_s > 0.0 && gap_s > 0.0)) {
     prediction.motion.T_map_sensor = previous.T_map_sensor;
@@ -19,6 +21,13 @@ MotionPrediction PredictMotion(const ScanMotion& previous,
   prediction.motion.T_map_sensor = previous.At(0.5) * SE3::Exp(middle * end_velocity);
   prediction.motion.twist = length * end_velocity;
   prediction.horizon_s = gap_s;
+  // What the previous pose, twist and acceleration do to the pose in the middle and to the twist.
+  const Matrix6d to_new =
+      (prediction.motion.T_map_sensor.Inverse() * previous.T_map_sensor).Adjoint();
+  Eigen::Matrix<double, 12, 18> transition;
+  transition << to_new, (0.5 + middle) * to_new, (0.125 + 0.5 * middle) * to_new,  //
+      Matrix6d::Zero(), length * to_new, 0.5 * length * to_new;
+  prediction.covariance = transition * covariance * transition.transpose();
   return prediction;
 }
 

@@ -12,6 +12,9 @@
 
 namespace covsplat {
 
+using Matrix12d = Eigen::Matrix<double, 12, 12>;
+using Matrix18d = Eigen::Matrix<double, 18, 18>;
+
 /// Motion of the sensor during one scan, second order in the phase s in [-0.5, 0.5]: at s the
 /// sensor is at `T_map_sensor * Exp(s * twist + s^2 / 2 * acceleration)`. Tangent vectors are in
 /// the sensor frame at mid scan, per scan duration and per duration squared.
@@ -37,15 +40,18 @@ struct MotionPrediction {
   /// How far it reaches beyond what is known: from the middle of the last tracked scan to the
   /// middle of this one. 0 or less for "no idea" (the motion prior is switched off).
   double horizon_s = 0.0;
+  /// Of the pose and of the twist at the scan's begin, from that of the motion before.
+  Matrix12d covariance = Matrix12d::Zero();
 };
 
 /// Continues a motion over `gap_s` from the middle of one scan to the middle of the next, at the
 /// velocity it ended with. An acceleration that went on from scan to scan would feed on its own
-/// errors.
+/// errors. `covariance` is that of the previous pose, twist and acceleration.
 MotionPrediction PredictMotion(const ScanMotion& previous,
                                double previous_duration_s,
                                double duration_s,
-                               double gap_s);
+                               double gap_s,
+                               const Matrix18d& covariance = Matrix18d::Zero());
 
 /// `T_a * T_mid_s` in float for all phases of a scan: a table of poses, linear in between. At 256
 /// intervals the interpolation is within 1e-6 rad for turns below 0.7 rad per scan.

@@ -2,28 +2,19 @@
 
 #include <algorithm>
 
+#include <Eigen/Cholesky>
+
 namespace covsplat {
 namespace {
 
 // Of a change by the configured accelerations, times `factor` [s^2].
-Vector6d Information(const GicpConfig& config, double factor) {
+Vector6d Variance(const GicpConfig& config, double factor) {
   const double rotation = factor * config.angular_acceleration_radps2;
   const double translation = factor * config.linear_acceleration_mps2;
-  Vector6d information;
-  information << Eigen::Vector3d::Constant(1.0 / (rotation * rotation)),
-      Eigen::Vector3d::Constant(1.0 / (translation * translation));
-  return information;
-}
-
-using Jacobian = Eigen::Matrix<double, 6, 18>;
-
-void AddSquares(NormalEquations& equations,
-                const Jacobian& jacobian,
-                const Vector6d& residual,
-                const Vector6d& information) {
-  const Eigen::Matrix<double, 18, 6> weighted = jacobian.transpose() * information.asDiagonal();
-  equations.hessian += weighted * jacobian;
-  equations.gradient += weighted * residual;
+  Vector6d variance;
+  variance << Eigen::Vector3d::Constant(rotation * rotation),
+      Eigen::Vector3d::Constant(translation * translation);
+  return variance;
 }
 
 }  // namespace
@@ -34,25 +25,32 @@ MotionPrior::MotionPrior(const MotionPrediction& prediction,
     : predicted_(prediction.motion) {
   const double horizon_s = prediction.horizon_s;
   if (!(horizon_s > 0.0)) return;
-  pose_information_ = Information(config, 0.5 * horizon_s * horizon_s);
-  if (!(duration_s > 0.0)) return;
-  velocity_information_ = Information(config, std::max(horizon_s, duration_s) * duration_s);
-  acceleration_information_ = Information(config, duration_s * duration_s);
+  const Vector6d pose_variance = Variance(config, 0.5 * horizon_s * horizon_s);
+  if (!(duration_s > 0.0)) {
+    begin_information_.topLeftCorner<6, 6>() = pose_variance.cwiseInverse().asDiagonal();
+    return;
+  }
+  Matrix12d covariance = prediction.covariance;
+  covariance.diagonal().head<6>() += pose_variance;
+  covariance.diagonal().tail<6>() += Variance(config, std::max(horizon_s, duration_s) * duration_s);
+  begin_information_ = covariance.llt().solve(Matrix12d::Identity());
+  acceleration_information_ = Variance(config, duration_s * duration_s).cwiseInverse().asDiagonal();
 }
 
 void MotionPrior::AddTo(NormalEquations& equations, const ScanMotion& motion) const {
   const Matrix6d zero = Matrix6d::Zero();
   const Matrix6d identity = Matrix6d::Identity();
-  Jacobian jacobian;
-  jacobian << identity, zero, zero;
-  const Vector6d moved = (predicted_.T_map_sensor.Inverse() * motion.T_map_sensor).Log();
-  AddSquares(equations, jacobian, moved, pose_information_);
-  jacobian << zero, identity, -0.5 * identity;
-  const Vector6d velocity = motion.twist - 0.5 * motion.acceleration;
-  const Vector6d predicted_velocity = predicted_.twist - 0.5 * predicted_.acceleration;
-  AddSquares(equations, jacobian, velocity - predicted_velocity, velocity_information_);
-  jacobian << zero, zero, identity;
-  AddSquares(equations, jacobian, motion.acceleration, acceleration_information_);
+  Eigen::Matrix<double, 12, 18> jacobian;
+  jacobian << identity, zero, zero,  //
+      zero, identity, -0.5 * identity;
+  Eigen::Matrix<double, 12, 1> residual;
+  residual << (predicted_.T_map_sensor.Inverse() * motion.T_map_sensor).Log(),
+      motion.twist - 0.5 * motion.acceleration - predicted_.twist + 0.5 * predicted_.acceleration;
+  const Eigen::Matrix<double, 18, 12> weighted = jacobian.transpose() * begin_information_;
+  equations.hessian += weighted * jacobian;
+  equations.gradient += weighted * residual;
+  equations.hessian.bottomRightCorner<6, 6>() += acceleration_information_;
+  equations.gradient.tail<6>() += acceleration_information_ * motion.acceleration;
 }
 
 }  // namespace covsplat

@@ -8,9 +8,10 @@ namespace covsplat {
 
 /// Half the squares, normalised to unit variance, of three differences: of the pose from the
 /// predicted one, of the velocity at the scan's begin from the predicted one, which is that at the
-/// end of the scan before, and of the acceleration from none. Their standard deviations are what
-/// the configured accelerations do within the prediction's horizon, or the scan's duration. Without
-/// a horizon it is silent.
+/// end of the scan before, and of the acceleration from none. Their covariance is that of the
+/// prediction, which makes the whole a Kalman filter over the scans, and what the configured
+/// accelerations do within the prediction's horizon, or the scan's duration. Without a horizon it
+/// is silent.
 class MotionPrior {
  public:
   MotionPrior(const MotionPrediction& prediction, double duration_s, const GicpConfig& config);
@@ -20,9 +21,8 @@ class MotionPrior {
 
  private:
   const ScanMotion predicted_;
-  Vector6d pose_information_ = Vector6d::Zero();
-  Vector6d velocity_information_ = Vector6d::Zero();
-  Vector6d acceleration_information_ = Vector6d::Zero();
+  Matrix12d begin_information_ = Matrix12d::Zero();  ///< of the pose and the velocity at the begin
+  Matrix6d acceleration_information_ = Matrix6d::Zero();
 };
 
 }  // namespace covsplat

@@ -15,7 +15,6 @@
 namespace covsplat {
 
 using Vector18d = Eigen::Matrix<double, 18, 1>;
-using Matrix18d = Eigen::Matrix<double, 18, 18>;
 
 /// Lie bracket matrix: ad(x) y = [x, y].
 Matrix6d AdjointOf(const Vector6d& twist);

@@ -139,7 +139,8 @@ Tracker::Prepared Tracker::Prepare(const Scan& scan,
 MotionPrediction Tracker::Predict(const ScanTiming& timing) const {
   if (!has_motion_) return {};
   const double gap_s = timing.mid_stamp_s - last_stamp_s_;
-  MotionPrediction prediction = PredictMotion(motion_, last_duration_s_, timing.duration_s, gap_s);
+  MotionPrediction prediction =
+      PredictMotion(motion_, last_duration_s_, timing.duration_s, gap_s, motion_covariance_);
   prediction.horizon_s = timing.mid_stamp_s - last_tracked_s_;
   if (last_duration_s_ > 0.0 && timing.duration_s > 0.0) return prediction;
   // A scan taken at once has no motion within it: go on as between the last two.
@@ -268,6 +269,7 @@ void Tracker::Conclude(const Scan& scan,
     return;
   }
   last_tracked_s_ = last_stamp_s_;
+  motion_covariance_ = result.align.covariance;
   constexpr double kForget = 0.1;
   const double ratio = result.align.inlier_ratio;
   usual_inlier_ratio_ +=

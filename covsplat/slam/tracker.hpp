@@ -140,6 +140,7 @@ class Tracker {
   std::optional<FirstScan> first_;  ///< until a second scan tells how it moved
   bool has_motion_ = false;
   ScanMotion motion_;  ///< of the last scan
+  Matrix18d motion_covariance_ = Matrix18d::Zero();
   double last_stamp_s_ = 0.0;
   double last_tracked_s_ = 0.0;
   double last_duration_s_ = 0.0;

@@ -120,6 +120,37 @@ TEST(PredictMotion, ContinuesAConstantVelocity) {
   EXPECT_GT(later.horizon_s, next.horizon_s);
 }
 
+// Against central differences of the prediction itself.
+TEST(PredictMotion, CarriesTheCovarianceAlong) {
+  ScanMotion motion{MakePose(0.1, 0.2, 0.3, 1, 2, 3), Vector6d::Zero(), Vector6d::Zero()};
+  motion.twist << 0.01, 0.02, 0.05, 0.15, 0.0, 0.01;
+  using Vector18d = Eigen::Matrix<double, 18, 1>;
+  const auto predict = [&](const Vector18d& step) {
+    const ScanMotion moved{motion.T_map_sensor * SE3::Exp(step.head<6>()),
+                           motion.twist + step.segment<6>(6),
+                           motion.acceleration + step.tail<6>()};
+    return PredictMotion(moved, 0.1, 0.05, 0.12).motion;
+  };
+  const SE3 middle = predict(Vector18d::Zero()).T_map_sensor;
+  Eigen::Matrix<double, 12, 18> jacobian;
+  for (int k = 0; k < 18; ++k) {
+    constexpr double kStep = 1e-5;
+    const ScanMotion up = predict(kStep * Vector18d::Unit(k));
+    const ScanMotion down = predict(-kStep * Vector18d::Unit(k));
+    jacobian.col(k) << (middle.Inverse() * up.T_map_sensor).Log() -
+                           (middle.Inverse() * down.T_map_sensor).Log(),
+        up.twist - down.twist;
+    jacobian.col(k) /= 2.0 * kStep;
+  }
+  const Matrix18d root = Matrix18d::Random();
+  const Matrix18d covariance = root * root.transpose();
+  const Matrix12d expected = jacobian * covariance * jacobian.transpose();
+  const Matrix12d carried = PredictMotion(motion, 0.1, 0.05, 0.12, covariance).covariance;
+  // To first order in the motion between the two scans.
+  EXPECT_LT((carried - expected).norm(), 0.15 * expected.norm());
+  EXPECT_TRUE(PredictMotion(motion, 0.1, 0.05, 0.12).covariance.isZero());
+}
+
 TEST(PredictMotion, KeepsThePoseWhenThereAreNoTimes) {
   const ScanMotion motion{MakePose(0.1, 0.2, 0.3, 1, 2, 3), Vector6d::Ones(), Vector6d::Zero()};
   const MotionPrediction next = PredictMotion(motion, 0.0, 0.1, 0.1);

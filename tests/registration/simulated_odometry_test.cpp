@@ -87,7 +87,7 @@ class SimulatedOdometry : public ::testing::Test {
       result.ate_m += std::pow(TranslationError(aligned.motion.T_map_sensor, truth), 2);
       result.rotation_rad += std::pow(RotationError(aligned.motion.T_map_sensor, truth), 2);
       result.iterations += aligned.iterations;
-      prediction = Predict(mode, prediction.motion.T_map_sensor, aligned.motion, k == 0);
+      prediction = Predict(mode, aligned, k == 0);
     }
     result.ate_m = std::sqrt(result.ate_m / kScans);
     result.rotation_rad = std::sqrt(result.rotation_rad / kScans);
@@ -95,9 +95,11 @@ class SimulatedOdometry : public ::testing::Test {
     return result;
   }
 
-  static MotionPrediction Predict(Mode mode, const SE3&, ScanMotion motion, bool first) {
+  static MotionPrediction Predict(Mode mode, const AlignResult& aligned, bool first) {
+    const ScanMotion& motion = aligned.motion;
     if (mode == Mode::kVelocity || mode == Mode::kAcceleration) {
-      MotionPrediction next = PredictMotion(motion, kScanPeriod, kScanPeriod, kScanPeriod);
+      MotionPrediction next =
+          PredictMotion(motion, kScanPeriod, kScanPeriod, kScanPeriod, aligned.covariance);
       if (first) next.horizon_s = 1.0;
       return next;
     }
