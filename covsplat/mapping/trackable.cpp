@@ -26,8 +26,9 @@ void AppendSurfels(const GaussianMap& map,
     if (signals.trackable[i] == 0 || signals.last_seen[i] < oldest) continue;
     const float opacity = 1.0f / (1.0f + std::exp(-table.Column(kOpacityLogit)[i]));
     const float gamma = opacity * signals.confidence[i];
-    if (opacity < static_cast<float>(config.min_opacity)) continue;
-    if (gamma < static_cast<float>(config.min_confidence)) continue;
+    // Written so that NaN fails.
+    if (!(opacity >= static_cast<float>(config.min_opacity))) continue;
+    if (!(gamma >= static_cast<float>(config.min_confidence))) continue;
     const Eigen::Vector3f mean(
         table.Column(kMeanX)[i], table.Column(kMeanY)[i], table.Column(kMeanZ)[i]);
     TargetSurfel surfel;
