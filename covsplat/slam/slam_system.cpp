@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "covsplat/core/check.hpp"
+
 namespace covsplat {
 namespace {
 
@@ -67,6 +69,7 @@ SlamSystem::SlamSystem(const SlamConfig& config,
       map_pool_(std::move(map_pool)),
       tracker_(config.tracker, *track_pool_),
       held_out_stride_(config.system.held_out_interval),
+      next_held_out_(held_out_stride_),
       mapper_(std::move(engine), sensor, config.mapper),
       keyframes_(kKeyframeQueue) {
   if (config_.system.schedule == Schedule::kThreaded) {
@@ -77,6 +80,7 @@ SlamSystem::SlamSystem(const SlamConfig& config,
 SlamSystem::~SlamSystem() { keyframes_.Close(); }
 
 std::optional<ScanRecord> SlamSystem::Process(const Scan& scan) {
+  COVSPLAT_CHECK(!finished_);
   const auto start = std::chrono::steady_clock::now();
   const std::shared_ptr<const RegistrationTarget> target = target_.Get();
   std::optional<TrackResult> result =
@@ -154,10 +158,11 @@ void SlamSystem::MapperLoop() {
 
 void SlamSystem::MaybeHoldOut(const TrackResult& result) {
   if (held_out_stride_ == 0 || result.state != TrackState::kTracking) return;
-  if (scans_ % held_out_stride_ != 0) return;
+  if (scans_ < next_held_out_) return;
   held_out_.push_back({result.tracked.scan,
                        result.tracked.T_map_sensor,
                        ProjectScan(sensor_, result.tracked.points).range_m});
+  next_held_out_ = scans_ + held_out_stride_;
   if (held_out_.size() < kMaxHeldOut) return;
   // Long runs: keep every other one and take half as many from now on.
   std::vector<HeldOut> thinned;

@@ -55,6 +55,7 @@ class SlamSystem {
   void UsePoses(Trajectory poses) { given_poses_ = std::move(poses); }
 
   /// Tracks a scan and hands it to the mapper if it is a keyframe. Nothing if it has no given pose.
+  /// Not after Finish.
   std::optional<ScanRecord> Process(const Scan& scan);
 
   /// Waits for the mapper and lets it do its last steps.
@@ -94,6 +95,7 @@ class SlamSystem {
   std::vector<std::int64_t> keyframe_scans_;
   std::int64_t scans_ = 0;
   int held_out_stride_;
+  std::int64_t next_held_out_;
   bool finished_ = false;
 
   // Owned by the mapper thread while it runs, by the calling thread otherwise.
