@@ -1,16 +1,12 @@
 // PLY files: named columns of vertices, and triangle meshes.
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
-#include <vector>
-
-#include <Eigen/Core>
 
 #include "covsplat/core/result.hpp"
+#include "covsplat/core/triangle_mesh.hpp"
 #include "covsplat/io/point_table.hpp"
 
 namespace covsplat {
@@ -20,11 +16,6 @@ namespace covsplat {
 Result<PointTable> ReadPly(const std::filesystem::path& path);
 /// The same from bytes in memory; `file` is for messages.
 Result<PointTable> ParsePly(std::string_view bytes, const std::string& file);
-
-struct TriangleMesh {
-  std::vector<Eigen::Vector3f> vertices;
-  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices of vertices
-};
 
 /// The vertices and faces of a PLY file; faces of more than three corners become fans.
 Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path);

@@ -119,24 +119,24 @@ Result<std::vector<PointColumn>> PlyBody::ReadColumns(const PlyElement& element)
   return columns;
 }
 
-Result<std::vector<std::array<std::uint32_t, 3>>> PlyBody::ReadTriangles(const PlyElement& element,
-                                                                         std::size_t vertex_count) {
-  std::vector<std::array<std::uint32_t, 3>> triangles;
+Result<std::vector<Eigen::Vector3i>> PlyBody::ReadTriangles(const PlyElement& element,
+                                                            std::size_t vertex_count) {
+  std::vector<Eigen::Vector3i> triangles;
   if (element.properties.empty()) return triangles;
   std::vector<PointColumn> ignored = EmptyColumns(element);
   std::vector<double> corners;
   for (std::size_t row = 0; row < element.count; ++row) {
     const Result<void> read = ReadRow(element, ignored, corners);
     if (!read) return Forward(read);
-    std::vector<std::uint32_t> indices;
+    std::vector<int> indices;
     for (const double corner : corners) {
       if (!(corner >= 0.0 && corner < static_cast<double>(vertex_count))) {
         return Broken(element, fmt::format("there is no vertex {}", corner));
       }
-      indices.push_back(static_cast<std::uint32_t>(corner));
+      indices.push_back(static_cast<int>(corner));
     }
     for (std::size_t k = 2; k < indices.size(); ++k) {
-      triangles.push_back({indices[0], indices[k - 1], indices[k]});
+      triangles.emplace_back(indices[0], indices[k - 1], indices[k]);
     }
   }
   return triangles;

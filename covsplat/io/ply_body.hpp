@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "covsplat/core/result.hpp"
 #include "covsplat/io/ply_header.hpp"
 #include "covsplat/io/point_table.hpp"
@@ -27,8 +29,8 @@ class PlyBody {
 
   /// The property vertex_indices (or vertex_index) of all rows, cut into triangles. Every index is
   /// below `vertex_count`.
-  Result<std::vector<std::array<std::uint32_t, 3>>> ReadTriangles(const PlyElement& element,
-                                                                  std::size_t vertex_count);
+  Result<std::vector<Eigen::Vector3i>> ReadTriangles(const PlyElement& element,
+                                                     std::size_t vertex_count);
 
  private:
   Result<std::vector<PointColumn>> ReadColumnsAtOnce(const PlyElement& element);

@@ -89,7 +89,7 @@ double CourtyardGround(double x, double y) {
          0.012 * std::sin(0.9 * x - 0.7 * y);
 }
 
-TriangleMesh MakeCourtyard(int seed) {
+WorldMesh MakeCourtyard(int seed) {
   Rng rng(static_cast<std::uint64_t>(seed));
   MeshBuilder mesh;
   AddGround(mesh, rng);

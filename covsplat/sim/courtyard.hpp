@@ -10,7 +10,7 @@
 
 namespace covsplat {
 
-TriangleMesh MakeCourtyard(int seed);
+WorldMesh MakeCourtyard(int seed);
 
 /// Height in metres of the walkable ground: smooth, without kerbs and steps.
 double CourtyardGround(double x, double y);

@@ -1,4 +1,4 @@
-// TriangleMesh and the simple shapes that the simulated worlds are put together from.
+// WorldMesh and the simple shapes that the simulated worlds are put together from.
 #pragma once
 
 #include <functional>
@@ -7,13 +7,13 @@
 
 #include <Eigen/Core>
 
+#include "covsplat/core/triangle_mesh.hpp"
+
 namespace covsplat {
 
 /// A triangle soup in the world frame. Triangles have no inside: both sides reflect alike.
-struct TriangleMesh {
-  std::vector<Eigen::Vector3f> vertices;   ///< [V] m
-  std::vector<Eigen::Vector3i> triangles;  ///< [T] indices of vertices
-  std::vector<float> reflectivity;         ///< [T] diffuse, 0 black to 1 white
+struct WorldMesh : TriangleMesh {
+  std::vector<float> reflectivity;  ///< [T] diffuse, 0 black to 1 white
 };
 
 /// An upright plane with its own coordinates, for walls: `u` metres along it, `z` up in the world,
@@ -95,14 +95,14 @@ class MeshBuilder {
             float thickness,
             float reflectivity);
 
-  TriangleMesh Take() && { return std::move(mesh_); }
+  WorldMesh Take() && { return std::move(mesh_); }
 
  private:
   int Vertex(const Eigen::Vector3f& position);
   void Triangle(int a, int b, int c, float reflectivity);
   void Recess(const Panel& panel, const Opening& opening, float reflectivity);
 
-  TriangleMesh mesh_;
+  WorldMesh mesh_;
 };
 
 }  // namespace covsplat

@@ -52,7 +52,7 @@ float DistanceToTriangle(const Vector3f& point,
 }
 
 struct DistanceQuery {
-  const TriangleMesh* mesh = nullptr;
+  const WorldMesh* mesh = nullptr;
   Vector3f point;
   float nearest = 0.0f;
 };
@@ -74,7 +74,7 @@ bool VisitTriangle(RTCPointQueryFunctionArguments* arguments) {
 }  // namespace
 
 struct Scene::Index {
-  explicit Index(TriangleMesh triangles) : mesh(std::move(triangles)) {
+  explicit Index(WorldMesh triangles) : mesh(std::move(triangles)) {
     COVSPLAT_CHECK(mesh.reflectivity.size() == mesh.triangles.size());
     device = rtcNewDevice("threads=1");
     COVSPLAT_CHECK(device != nullptr);
@@ -95,17 +95,17 @@ struct Scene::Index {
   Index(const Index&) = delete;
   Index& operator=(const Index&) = delete;
 
-  TriangleMesh mesh;
+  WorldMesh mesh;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
 };
 
-Scene::Scene(TriangleMesh mesh) : index_(std::make_unique<const Index>(std::move(mesh))) {}
+Scene::Scene(WorldMesh mesh) : index_(std::make_unique<const Index>(std::move(mesh))) {}
 Scene::~Scene() = default;
 Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
 
-const TriangleMesh& Scene::Mesh() const { return index_->mesh; }
+const WorldMesh& Scene::Mesh() const { return index_->mesh; }
 
 std::optional<Scene::Hit> Scene::Cast(const Vector3f& origin,
                                       const Vector3f& direction,

@@ -22,12 +22,12 @@ class Scene {
     std::uint32_t triangle = 0;  ///< index into Mesh().triangles
   };
 
-  explicit Scene(TriangleMesh mesh);
+  explicit Scene(WorldMesh mesh);
   ~Scene();
   Scene(Scene&&) noexcept;
   Scene& operator=(Scene&&) noexcept;
 
-  const TriangleMesh& Mesh() const;
+  const WorldMesh& Mesh() const;
 
   /// First surface along a ray, if one is nearer than `max_range_m`; `direction` is a unit vector.
   std::optional<Hit> Cast(const Eigen::Vector3f& origin,

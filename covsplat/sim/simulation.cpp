@@ -21,7 +21,7 @@ Result<Simulation> Simulation::Create(const SimulationConfig& config) {
                 config.lidar.elevation_low_deg,
                 config.lidar.elevation_high_deg);
   }
-  Result<TriangleMesh> mesh = MakeWorld(config.world, config.seed);
+  Result<WorldMesh> mesh = MakeWorld(config.world, config.seed);
   if (!mesh) return Forward(mesh);
   Result<Motion> motion = MakeMotion(config.world, config.motion, config.seed);
   if (!motion) return Forward(motion);

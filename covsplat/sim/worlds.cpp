@@ -13,7 +13,7 @@ constexpr std::array<std::string_view, 1> kNames = {"courtyard"};
 
 std::span<const std::string_view> WorldNames() { return kNames; }
 
-Result<TriangleMesh> MakeWorld(std::string_view name, int seed) {
+Result<WorldMesh> MakeWorld(std::string_view name, int seed) {
   if (name == "courtyard") return MakeCourtyard(seed);
   return Fail(ErrorCode::kUsage, "unknown world '{}'; known: {}", name, fmt::join(kNames, ", "));
 }

@@ -14,6 +14,6 @@ std::span<const std::string_view> WorldNames();
 
 /// The surfaces of a world, in metres, z up. The seed varies details (window depths, leaves,
 /// plants), never the plan; the same seed gives the same triangles.
-Result<TriangleMesh> MakeWorld(std::string_view name, int seed);
+Result<WorldMesh> MakeWorld(std::string_view name, int seed);
 
 }  // namespace covsplat

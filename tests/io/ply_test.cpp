@@ -106,7 +106,7 @@ TEST(Ply, FacesBecomeTriangles) {
   ASSERT_TRUE(mesh) << mesh.error().message;
   ASSERT_EQ(mesh->vertices.size(), 4u);
   EXPECT_EQ(mesh->vertices[2], Eigen::Vector3f(1, 1, 0));
-  using Triangle = std::array<std::uint32_t, 3>;
+  using Triangle = Eigen::Vector3i;
   EXPECT_EQ(mesh->triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 1, 2}, {0, 2, 3}}));
 }
 

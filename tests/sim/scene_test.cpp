@@ -91,7 +91,7 @@ TEST(Scene, KeepsItsTrianglesWhenMoved) {
 TEST(MeshBuilder, RoundShapesHaveTheirRadii) {
   MeshBuilder mesh;
   mesh.Ellipsoid({1.0f, 2.0f, 3.0f}, {1.0f, 2.0f, 3.0f}, 2, 0.5f);
-  const TriangleMesh ellipsoid = std::move(mesh).Take();
+  const WorldMesh ellipsoid = std::move(mesh).Take();
   EXPECT_EQ(ellipsoid.triangles.size(), 20u * 16u);
   for (const Vector3f& vertex : ellipsoid.vertices) {
     const Vector3f scaled =
@@ -125,9 +125,9 @@ TEST(MeshBuilder, WallsHaveHolesWhereTheirOpeningsAre) {
 
 TEST(Worlds, AreMadeFromTheirSeedAndNothingElse) {
   for (const std::string_view name : WorldNames()) {
-    const TriangleMesh first = MakeWorld(name, 3).value();
-    const TriangleMesh again = MakeWorld(name, 3).value();
-    const TriangleMesh other = MakeWorld(name, 4).value();
+    const WorldMesh first = MakeWorld(name, 3).value();
+    const WorldMesh again = MakeWorld(name, 3).value();
+    const WorldMesh other = MakeWorld(name, 4).value();
     EXPECT_EQ(first.vertices, again.vertices);
     EXPECT_EQ(first.triangles, again.triangles);
     EXPECT_NE(first.vertices, other.vertices);
