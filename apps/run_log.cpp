@@ -63,7 +63,7 @@ std::string_view NameOf(TrackState state) {
   return "unknown";
 }
 
-Result<RunLog> RunLog::Open(const std::filesystem::path& folder) {
+Result<RunLog> RunLog::Open(const std::filesystem::path& folder, const ScanSelection& scans) {
   Result<AppendFile> tum = AppendFile::Open(folder / "trajectory_tum.txt");
   if (!tum) return Forward(tum);
   Result<AppendFile> kitti = AppendFile::Open(folder / "trajectory_kitti.txt");
@@ -71,13 +71,44 @@ Result<RunLog> RunLog::Open(const std::filesystem::path& folder) {
   Result<AppendFile> frames = AppendFile::Open(folder / "frames.csv");
   if (!frames) return Forward(frames);
   if (const Result<void> begun = frames->Append(Header()); !begun) return Forward(begun);
-  return RunLog(std::move(*tum), std::move(*kitti), std::move(*frames));
+  return RunLog(scans, std::move(*tum), std::move(*kitti), std::move(*frames));
 }
 
 Result<void> RunLog::Append(const ScanRecord& record, std::int64_t rss_bytes) {
-  return tum_.Append(TumLine({record.stamp_s, record.T_map_sensor}))
-      .and_then([&] { return kitti_.Append(KittiLine(record.T_map_sensor)); })
-      .and_then([&] { return frames_.Append(Row(record, rss_bytes)); });
+  const TimedPose pose = {record.stamp_s, record.T_map_sensor};
+  const std::int64_t row = (record.scan - scans_.first) / scans_.jump;
+  return FillGap(row - rows_, pose)
+      .and_then([&] { return tum_.Append(TumLine(pose)); })
+      .and_then([&] { return kitti_.Append(KittiLine(pose.T_world_sensor)); })
+      .and_then([&] { return frames_.Append(Row(record, rss_bytes)); })
+      .map([&] {
+        rows_ = row + 1;
+        last_ = pose;
+      });
+}
+
+// In one piece, so that a killed run does not end in the middle of a gap.
+Result<void> RunLog::FillGap(std::int64_t rows, const TimedPose& next) {
+  std::string tum;
+  std::string kitti;
+  for (std::int64_t i = 1; i <= rows; ++i) {
+    TimedPose pose = next;
+    if (last_) {
+      const double share = static_cast<double>(i) / static_cast<double>(rows + 1);
+      pose.stamp_s = last_->stamp_s + share * (next.stamp_s - last_->stamp_s);
+      pose.T_world_sensor = Interpolate(last_->T_world_sensor, next.T_world_sensor, share);
+      tum += TumLine(pose);
+    }
+    kitti += KittiLine(pose.T_world_sensor);
+  }
+  return tum_.Append(tum).and_then([&] { return kitti_.Append(kitti); });
+}
+
+Result<void> RunLog::FillTo(std::int64_t count) {
+  if (!last_) return {};
+  std::string kitti;
+  for (; rows_ < count; ++rows_) kitti += KittiLine(last_->T_world_sensor);
+  return kitti_.Append(kitti);
 }
 
 Result<void> RunLog::Close() {

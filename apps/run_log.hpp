@@ -2,23 +2,41 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "covsplat/io/output_file.hpp"
 #include "covsplat/slam/slam_system.hpp"
 
 namespace covsplat {
 
-/// trajectory_tum.txt, trajectory_kitti.txt and frames.csv.
+/// Which scans of a recording a run takes: `first`, `first + jump`, ...
+struct ScanSelection {
+  std::int64_t first = 0;
+  std::int64_t jump = 1;
+};
+
+/// trajectory_tum.txt, trajectory_kitti.txt and frames.csv. Scans that were left out (damaged, out
+/// of order, dropped) get poses too, or the rows of KITTI, which have no times, would not tell
+/// which scan they are of: between their neighbours they are interpolated; before the first and
+/// after the last tracked scan, where their times are not known, they repeat its pose in the KITTI
+/// file and have no row in the TUM file. frames.csv has the tracked scans alone.
 class RunLog {
  public:
-  static Result<RunLog> Open(const std::filesystem::path& folder);
+  static Result<RunLog> Open(const std::filesystem::path& folder, const ScanSelection& scans);
 
   Result<void> Append(const ScanRecord& record, std::int64_t rss_bytes);
+  /// After the last scan; `count` scans were selected in all.
+  Result<void> FillTo(std::int64_t count);
   Result<void> Close();
 
  private:
-  RunLog(AppendFile tum, AppendFile kitti, AppendFile frames)
-      : tum_(std::move(tum)), kitti_(std::move(kitti)), frames_(std::move(frames)) {}
+  RunLog(const ScanSelection& scans, AppendFile tum, AppendFile kitti, AppendFile frames)
+      : scans_(scans), tum_(std::move(tum)), kitti_(std::move(kitti)), frames_(std::move(frames)) {}
+  Result<void> FillGap(std::int64_t rows, const TimedPose& next);
+
+  ScanSelection scans_;
+  std::int64_t rows_ = 0;  ///< of the KITTI file
+  std::optional<TimedPose> last_;
 
   AppendFile tum_;
   AppendFile kitti_;

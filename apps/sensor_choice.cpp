@@ -14,18 +14,20 @@ bool IsComplete(const SensorConfig& sensor) {
   return !sensor.elevation_deg.empty() && sensor.columns > 0;
 }
 
+/// Where the first scans were taken says little about how near or far later returns will be, so the
+/// estimated ranges are for people only.
+void FillRanges(SlamConfig& config) {
+  SensorConfig& sensor = config.sensor;
+  if (sensor.min_range_m == 0.0) sensor.min_range_m = config.tracker.preprocess.min_range_m;
+  if (sensor.max_range_m == 0.0) sensor.max_range_m = config.tracker.preprocess.max_range_m;
+}
+
 void FillFrom(const SensorModel& model, SlamConfig& config) {
   SensorConfig& sensor = config.sensor;
   if (sensor.elevation_deg.empty()) {
     for (const double e : model.Elevations()) sensor.elevation_deg.push_back(e / kDegree);
   }
   if (sensor.columns == 0) sensor.columns = model.Columns();
-  if (sensor.min_range_m == 0.0) {
-    sensor.min_range_m = std::max(model.MinRange(), config.tracker.preprocess.min_range_m);
-  }
-  if (sensor.max_range_m == 0.0) {
-    sensor.max_range_m = std::min(model.MaxRange(), config.tracker.preprocess.max_range_m);
-  }
 }
 
 Result<SensorModel> ModelOf(const SlamConfig& config) {
@@ -41,17 +43,16 @@ Result<SensorModel> ModelOf(const SlamConfig& config) {
     return Fail(
         ErrorCode::kUsage, "sensor.columns is {}; choose a positive multiple of 4", sensor.columns);
   }
-  const double low =
-      sensor.min_range_m > 0.0 ? sensor.min_range_m : config.tracker.preprocess.min_range_m;
-  const double high =
-      sensor.max_range_m > 0.0 ? sensor.max_range_m : config.tracker.preprocess.max_range_m;
-  if (low >= high) {
-    return Fail(
-        ErrorCode::kUsage, "sensor.min_range_m ({}) must be below max_range_m ({})", low, high);
+  if (sensor.min_range_m >= sensor.max_range_m) {
+    return Fail(ErrorCode::kUsage,
+                "sensor.min_range_m ({}) must be below sensor.max_range_m ({})",
+                sensor.min_range_m,
+                sensor.max_range_m);
   }
   std::vector<double> elevation_rad;
   for (const double e : table) elevation_rad.push_back(e * kDegree);
-  return SensorModel(std::move(elevation_rad), sensor.columns, low, high);
+  return SensorModel(
+      std::move(elevation_rad), sensor.columns, sensor.min_range_m, sensor.max_range_m);
 }
 
 }  // namespace
@@ -86,6 +87,7 @@ Result<SensorChoice> ChooseSensor(const std::filesystem::path& recording,
     FillFrom(estimate.model, config);
     verdict = std::move(estimate.verdict);
   }
+  FillRanges(config);
   Result<SensorModel> model = ModelOf(config);
   if (!model) return Forward(model);
   return SensorChoice{std::move(*model), std::move(verdict)};

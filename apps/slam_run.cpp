@@ -138,18 +138,20 @@ Result<void> FeedScans(Prepared& run, RunLog& log, Progress& progress) {
   }
   run.results.feed = run.feed->Counts();
   run.results.interrupted = Interrupted();
-  return log.Close();
+  const bool complete = !run.results.interrupted && run.results.without_pose == 0;
+  const Result<void> filled = complete ? log.FillTo(run.scans) : Result<void>();
+  return filled.and_then([&] { return log.Close(); });
 }
 
 double SecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-Result<void> Track(Prepared& run, bool quiet) {
-  Result<RunLog> log = RunLog::Open(run.folder);
+Result<void> Track(Prepared& run, const RunRequest& request) {
+  Result<RunLog> log = RunLog::Open(run.folder, {request.first_scan, request.jump});
   if (!log) return Forward(log);
   Progress::Options options;
-  options.quiet = quiet;
+  options.quiet = request.quiet;
   Progress progress(options);
   const auto start = std::chrono::steady_clock::now();
   if (const Result<void> fed = FeedScans(run, *log, progress); !fed) return fed;
@@ -193,7 +195,7 @@ ExitCode RunSlam(const RunRequest& original) {
   }
   const Result<void> saved = WriteFileAtomically(run->folder / "config.yaml", config_yaml);
   if (!saved) return ReportError(saved.error());
-  if (const auto tracked = Track(*run, request.quiet); !tracked) {
+  if (const auto tracked = Track(*run, request); !tracked) {
     return ReportError(tracked.error());
   }
   const Result<void> concluded =

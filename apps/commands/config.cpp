@@ -31,6 +31,8 @@ int Dump(const ConfigOptions& options) {
 int Check(const ConfigOptions& options) {
   const Result<AppConfig> config = ResolveConfig<AppConfig>(options);
   if (!config) return ReportError(config.error());
+  const Result<void> valid = CheckSlamConfig(config->slam);
+  if (!valid) return ReportError(valid.error());
   return Print("the configuration is valid\n");
 }
 

@@ -11,7 +11,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kRemedy =
-    "give the folder that holds the scans: velodyne/*.bin or *.bin (KITTI: float32 x y z "
+    "give the folder that holds the scans: velodyne/*.bin, velodyne_points/data/*.bin or *.bin "
+    "(KITTI: float32 x y z "
     "intensity), *.pcd or *.ply";
 
 bool IsDigit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
@@ -119,8 +120,10 @@ bool NaturalLess(std::string_view a, std::string_view b) {
 Result<RecordingLayout> InspectRecording(const fs::path& folder, ScanFormat format) {
   const Result<void> usable = CheckFolder(folder);
   if (!usable) return Forward(usable);
-  const fs::path velodyne = IfExists(folder / "velodyne");
-  const fs::path data = velodyne.empty() ? folder : velodyne;
+  const fs::path raw = folder / "velodyne_points";  // KITTI as it was recorded
+  fs::path data = IfExists(folder / "velodyne");
+  if (data.empty()) data = IfExists(raw / "data");
+  if (data.empty()) data = folder;
   Result<std::vector<fs::path>> files = ListScanFiles(data);
   if (!files) return Forward(files);
   RecordingLayout layout;
@@ -141,6 +144,7 @@ Result<RecordingLayout> InspectRecording(const fs::path& folder, ScanFormat form
   }
   layout.files = std::move(*files);
   layout.stamp_file = IfExists(folder / "times.txt");
+  if (layout.stamp_file.empty()) layout.stamp_file = IfExists(raw / "timestamps.txt");
   layout.point_time_folder = IfHoldsFiles(folder / "timestamps");
   return layout;
 }

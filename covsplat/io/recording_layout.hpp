@@ -25,12 +25,13 @@ struct EnumNames<ScanFormat> {
 struct RecordingLayout {
   ScanFormat format = ScanFormat::kKitti;
   std::vector<std::filesystem::path> files;  ///< one per scan, in order of the numbers in the names
-  std::filesystem::path stamp_file;          ///< times.txt, or empty
+  std::filesystem::path stamp_file;          ///< times.txt, KITTI's raw timestamps.txt, or empty
   std::filesystem::path point_time_folder;   ///< timestamps/ if anything is in it, or empty
 };
 
-/// Looks for scans in `folder/velodyne`, or else in the folder itself. `format` kAuto takes the one
-/// kind of scan files that is there. Errors say what was looked for.
+/// Looks for scans in `folder/velodyne`, `folder/velodyne_points/data`, or else in the folder
+/// itself. `format` kAuto takes the one kind of scan files that is there. Errors say what was
+/// looked for.
 Result<RecordingLayout> InspectRecording(const std::filesystem::path& folder, ScanFormat format);
 
 /// Order of names in which numbers count as numbers: scan_2 before scan_10.

@@ -9,6 +9,7 @@
 #include "covsplat/io/pcd.hpp"
 #include "covsplat/io/ply.hpp"
 #include "covsplat/io/table_scan.hpp"
+#include "covsplat/io/text.hpp"
 #include "covsplat/io/trajectory_file.hpp"
 
 namespace covsplat {
@@ -92,18 +93,34 @@ std::string FolderSource::Description() const {
   return fmt::format("{} folder, {} scans, {}, {}", kind, count_, stamps, point_times);
 }
 
+/// For a part of a recording beside the times of the whole: the times by the numbers that the files
+/// have for names, or nothing if they do not tell.
+std::vector<double> StampsByNumber(const std::vector<std::filesystem::path>& files,
+                                   const std::vector<double>& stamps) {
+  std::vector<double> chosen;
+  for (const std::filesystem::path& file : files) {
+    const auto number = ParseInteger(file.stem().string());
+    if (!number || *number < 0 || *number >= static_cast<std::int64_t>(stamps.size())) return {};
+    chosen.push_back(stamps[static_cast<std::size_t>(*number)]);
+  }
+  return chosen;
+}
+
 Result<std::vector<double>> StampsOf(const RecordingLayout& layout) {
   if (layout.stamp_file.empty()) return std::vector<double>();
   Result<std::vector<double>> stamps = ReadStamps(layout.stamp_file);
-  if (stamps && stamps->size() != layout.files.size()) {
-    return Fail(ErrorCode::kInput,
-                "{}: has {} lines for {} scans; it needs one time per scan, or remove it to have "
-                "scans at even times",
-                layout.stamp_file.string(),
-                stamps->size(),
-                layout.files.size());
-  }
-  return stamps;
+  if (!stamps || stamps->size() == layout.files.size()) return stamps;
+  std::vector<double> chosen;
+  if (stamps->size() > layout.files.size()) chosen = StampsByNumber(layout.files, *stamps);
+  if (!chosen.empty()) return chosen;
+  return Fail(
+      ErrorCode::kInput,
+      "{}: has {} lines for {} scans; it needs one time per scan (of a part of a recording, "
+      "the files' names must be their numbers in the whole), or remove it to have scans at "
+      "even times",
+      layout.stamp_file.string(),
+      stamps->size(),
+      layout.files.size());
 }
 
 }  // namespace

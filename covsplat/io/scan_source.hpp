@@ -35,7 +35,7 @@ struct SourceOptions {
 };
 
 /// Opens a folder of scans. Stamps come from absolute times of the points, else from times.txt
-/// (which then needs one line per scan), else from the number of the scan.
+/// (one line per scan, or per number that a file has for a name), else from the number of the scan.
 Result<std::unique_ptr<ScanSource>> OpenScanSource(const std::filesystem::path& folder,
                                                    const SourceOptions& options);
 

@@ -1,5 +1,6 @@
 #include "covsplat/io/trajectory_file.hpp"
 
+#include <chrono>
 #include <cmath>
 #include <optional>
 #include <string_view>
@@ -31,6 +32,30 @@ std::optional<TimedPose> TumPose(std::span<const double> n) {
   const Eigen::Quaterniond rotation(n[7], n[4], n[5], n[6]);
   if (std::abs(rotation.norm() - 1.0) > kRotationTolerance) return std::nullopt;
   return TimedPose{n[0], SE3(rotation, {n[1], n[2], n[3]})};
+}
+
+// "2011-09-26 13:02:25.594360375", as KITTI's raw recordings have it, in seconds since 1970 (UTC).
+std::optional<double> DatedStamp(std::string_view date, std::string_view time_of_day) {
+  const auto number = [](std::string_view text, std::size_t from, std::size_t count) {
+    return text.size() < from ? std::nullopt : ParseDouble(text.substr(from, count));
+  };
+  const auto year = number(date, 0, 4), month = number(date, 5, 2), day = number(date, 8, 2);
+  const auto hour = number(time_of_day, 0, 2), minute = number(time_of_day, 3, 2);
+  const auto second = number(time_of_day, 6, std::string_view::npos);
+  if (!year || !month || !day || !hour || !minute || !second) return std::nullopt;
+  const std::chrono::year_month_day civil{std::chrono::year(static_cast<int>(*year)),
+                                          std::chrono::month(static_cast<unsigned>(*month)),
+                                          std::chrono::day(static_cast<unsigned>(*day))};
+  if (!civil.ok()) return std::nullopt;
+  const auto days = std::chrono::sys_days(civil).time_since_epoch().count();
+  return ((static_cast<double>(days) * 24.0 + *hour) * 60.0 + *minute) * 60.0 + *second;
+}
+
+std::optional<double> StampOf(std::string_view line) {
+  const std::vector<std::string_view> words = SplitWords(line);
+  if (words.size() == 1) return ParseDouble(words[0]);
+  if (words.size() == 2) return DatedStamp(words[0], words[1]);
+  return std::nullopt;
 }
 
 // Calls take(numbers) for every line with content; take returns what is wrong with it, or "".
@@ -113,16 +138,20 @@ Result<std::vector<SE3>> ReadKittiPoses(const std::filesystem::path& path) {
 }
 
 Result<std::vector<double>> ReadStamps(const std::filesystem::path& path) {
+  const Result<std::string> text = ReadFile(path);
+  if (!text) return Forward(text);
   std::vector<double> stamps;
-  const Result<void> read = ForEachLine(path, [&](const std::vector<double>& numbers) {
-    if (numbers.size() != 1 || !AllFinite(numbers)) return "expected one time in seconds";
-    if (!stamps.empty() && numbers[0] < stamps.back()) {
-      return "its time is earlier than that of the line before";
+  LineReader reader(*text);
+  while (reader.NextWithContent()) {
+    const std::optional<double> stamp_s = StampOf(reader.Line());
+    if (!stamp_s || !std::isfinite(*stamp_s)) {
+      return BadLine(path, reader, "expected one time in seconds, or a date and a time of day");
     }
-    stamps.push_back(numbers[0]);
-    return "";
-  });
-  if (!read) return Forward(read);
+    if (!stamps.empty() && *stamp_s < stamps.back()) {
+      return BadLine(path, reader, "its time is earlier than that of the line before");
+    }
+    stamps.push_back(*stamp_s);
+  }
   return stamps;
 }
 

@@ -1,6 +1,7 @@
 // When each point of a scan was measured.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -25,8 +26,25 @@ struct EnumNames<TimeSource> {
   }};
 };
 
+/// What is estimated of the motion within a scan; the rest is taken from the prediction.
+enum class MotionModel {
+  kRigid,         ///< only the pose: 6 unknowns
+  kVelocity,      ///< pose and twist: 12
+  kAcceleration,  ///< pose, twist and its change within the scan: 18
+};
+
+template <>
+struct EnumNames<MotionModel> {
+  static constexpr std::array<EnumName<MotionModel>, 3> kNames = {{
+      {MotionModel::kRigid, "none"},
+      {MotionModel::kVelocity, "velocity"},
+      {MotionModel::kAcceleration, "acceleration"},
+  }};
+};
+
 struct DeskewConfig {
   TimeSource time_source = TimeSource::kField;
+  MotionModel refine = MotionModel::kAcceleration;
   double azimuth_start_deg = 180.0;
   bool azimuth_clockwise = true;
   double scan_period_s = 0.1;
@@ -34,6 +52,10 @@ struct DeskewConfig {
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
     v.Field("time_source", c.time_source, "where the points' times come from");
+    v.Field("refine",
+            c.refine,
+            "what registration estimates of the motion within a scan, to deskew it once more; "
+            "none: deskewed by the velocity of the scans before alone");
     v.Field("azimuth_start_deg",
             c.azimuth_start_deg,
             Range{-360.0, 360.0},

@@ -14,22 +14,6 @@
 
 namespace covsplat {
 
-/// What is estimated of the motion within a scan; the rest is taken from the prediction.
-enum class MotionModel {
-  kRigid,         ///< only the pose: 6 unknowns
-  kVelocity,      ///< pose and twist: 12
-  kAcceleration,  ///< pose, twist and its change within the scan: 18
-};
-
-template <>
-struct EnumNames<MotionModel> {
-  static constexpr std::array<EnumName<MotionModel>, 3> kNames = {{
-      {MotionModel::kRigid, "rigid"},
-      {MotionModel::kVelocity, "velocity"},
-      {MotionModel::kAcceleration, "acceleration"},
-  }};
-};
-
 struct GicpConfig {
   double max_correspondence_m = 1.0;
   int max_iterations = 100;
@@ -40,7 +24,7 @@ struct GicpConfig {
   double inlier_distance_m = 0.1;
   double degeneracy_ratio = 0.02;
   double hold_ratio = 0.002;
-  MotionModel motion_model = MotionModel::kAcceleration;
+  MotionModel motion_model = MotionModel::kAcceleration;  ///< the tracker takes `deskew.refine`
   double angular_acceleration_radps2 = 8.0;
   double linear_acceleration_mps2 = 4.0;
   double points_per_measurement = 8.0;
@@ -79,7 +63,6 @@ struct GicpConfig {
             c.hold_ratio,
             Range{0.0, 1.0},
             "... and with less than this share they keep the prediction");
-    v.Field("motion_model", c.motion_model, "what to estimate of the motion within a scan");
     v.Field("angular_acceleration_radps2",
             c.angular_acceleration_radps2,
             Range{0.01, 1000.0},

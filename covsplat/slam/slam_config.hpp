@@ -30,11 +30,11 @@ struct SensorConfig {
     v.Field("min_range_m",
             c.min_range_m,
             Range{0.0, 100.0},
-            "nearest return the map is made of; 0: estimated");
+            "nearest return the map is made of; 0: preprocess.min_range_m");
     v.Field("max_range_m",
             c.max_range_m,
             Range{0.0, 1000.0},
-            "farthest return the map is made of; 0: estimated");
+            "farthest return the map is made of; 0: preprocess.max_range_m");
     v.Field("max_columns", c.max_columns, Range{64, 16384}, "estimate at most so many columns");
     v.Field("estimate_scans", c.estimate_scans, Range{1, 100}, "scans to estimate from");
   }
@@ -93,5 +93,8 @@ struct SlamConfig {
     v.Section("system", c.system, "threads and schedule");
   }
 };
+
+/// What the ranges of single fields cannot say: limits that are the wrong way round.
+Result<void> CheckSlamConfig(const SlamConfig& config);
 
 }  // namespace covsplat

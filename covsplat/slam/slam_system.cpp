@@ -44,6 +44,7 @@ ScanRecord MakeRecord(const TrackResult& result) {
 
 Result<std::unique_ptr<SlamSystem>> SlamSystem::Create(const SlamConfig& config,
                                                        const SensorModel& sensor) {
+  if (const Result<void> valid = CheckSlamConfig(config); !valid) return Forward(valid);
   const int all = config.system.threads > 0
                       ? config.system.threads
                       : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));

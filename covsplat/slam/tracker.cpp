@@ -53,6 +53,11 @@ std::vector<Eigen::Vector3d> SearchTurns(double angle_rad) {
   return turns;
 }
 
+TrackerConfig WithMotionModel(TrackerConfig config) {
+  config.gicp.motion_model = config.deskew.refine;
+  return config;
+}
+
 /// The motion within a scan if the sensor went on evenly from one mid-scan pose to the next.
 Vector6d TwistBetween(const SE3& T_from, const SE3& T_to, double gap_s, double duration_s) {
   if (gap_s <= 0.0 || duration_s <= 0.0) return Vector6d::Zero();
@@ -61,7 +66,8 @@ Vector6d TwistBetween(const SE3& T_from, const SE3& T_to, double gap_s, double d
 
 }  // namespace
 
-Tracker::Tracker(const TrackerConfig& config, ThreadPool& pool) : config_(config), pool_(pool) {}
+Tracker::Tracker(const TrackerConfig& config, ThreadPool& pool)
+    : config_(WithMotionModel(config)), pool_(pool) {}
 
 TrackResult Tracker::Track(const Scan& scan, const RegistrationTarget* target) {
   TrackResult result;
@@ -257,7 +263,12 @@ void Tracker::Conclude(const Scan& scan,
   if (has_motion_ && gap_s > 0.0 && result.state == TrackState::kTracking) {
     velocity_ = (motion_.T_map_sensor.Inverse() * motion.T_map_sensor).Log() / gap_s;
   }
-  motion_ = motion;
+  ScanMotion learnt = motion;
+  if (config_.deskew.refine == MotionModel::kRigid && result.state == TrackState::kTracking) {
+    learnt.twist =
+        TwistBetween(motion_.T_map_sensor, motion.T_map_sensor, gap_s, prepared.timing.duration_s);
+  }
+  motion_ = learnt;
   has_motion_ = true;
   last_stamp_s_ = prepared.timing.mid_stamp_s;
   last_duration_s_ = prepared.timing.duration_s;

@@ -75,6 +75,18 @@ def metrics(folder):
     return json.loads((folder / "metrics.json").read_text())
 
 
+def check_rows(folder, recording):
+    """A pose for every scan, those that were left out included, in both files."""
+    rows = poses(folder)
+    stamps = [float(line) for line in (recording / "times.txt").read_text().splitlines()]
+    assert len(rows) == len(stamps), rows
+    late = [abs(row[0] - stamp) for row, stamp in zip(rows, stamps)]
+    assert max(late) < 2e-3, late  # a scan's middle, whose first or last columns may be empty
+    kitti = [[float(word) for word in line.split()]
+             for line in (folder / "trajectory_kitti.txt").read_text().splitlines()]
+    assert [row[3::4] for row in kitti] == [row[1:4] for row in rows]
+
+
 def set_points(recording, index, points, times=None):
     """Replaces a scan by (x, y, z, intensity) rows."""
     data = b"".join(struct.pack("<4f", *point) for point in points)
@@ -121,6 +133,10 @@ def wrong_requests_are_usage_errors(bench):
     expect(bench.run(bench.good, "x", "-s", "gicp.max_iteration=3"), 2, err="gicp.max_iterations")
     expect(bench.run(bench.good, "x", "-s", "keyframe.min_overlap=7"), 2, err="0 to 1")
     expect(bench.run(bench.good, "x", "--format", "las"), 2, err="kitti")
+    expect(bench.run(bench.good, "x", "-s", "mapping.spawn.min_scale_m=0.9"), 2,
+           err="below mapping.spawn.max_scale_m")
+    expect(bench.call("config", "check", "-s", "preprocess.min_range_m=90", "-s",
+                      "preprocess.max_range_m=9"), 2, err="below preprocess.max_range_m")
     expect(bench.run(bench.good, "x", "-s", "sensor.columns=30", "-s",
                      "sensor.elevation_deg=[10,0,-10]"), 2, err="multiple of 4")
     expect(bench.run(bench.good, "x", "-s", "sensor.columns=32", "-s",
@@ -148,7 +164,20 @@ def a_truncated_scan_is_left_out(bench):
     call = bench.run(recording, "out_truncated")
     expect(call, 0, err="000005.bin")
     assert metrics(bench.folder / "out_truncated")["scans"]["damaged"] == 1
-    assert len(poses(bench.folder / "out_truncated")) == SCANS - 1
+    check_rows(bench.folder / "out_truncated", bench.good)
+
+
+@case
+def scans_damaged_at_the_ends_keep_their_rows_in_the_kitti_file(bench):
+    recording = bench.copy("damaged_ends")
+    for i in [0, SCANS - 1]:
+        bench.scan(recording, i).write_bytes(b"short")
+    expect(bench.run(recording, "out_damaged_ends"), 0)
+    out = bench.folder / "out_damaged_ends"
+    assert len(poses(out)) == SCANS - 2
+    kitti = (out / "trajectory_kitti.txt").read_text().splitlines()
+    assert len(kitti) == SCANS
+    assert kitti[0] == kitti[1] and kitti[-1] == kitti[-2]
 
 
 @case
@@ -206,7 +235,7 @@ def time_that_goes_backwards_is_left_out(bench):
     (recording / "times.txt").write_text("\n".join(times) + "\n")
     expect(bench.run(recording, "out_backwards"), 0, err="not later than")
     assert metrics(bench.folder / "out_backwards")["scans"]["backwards"] == 1
-    assert len(poses(bench.folder / "out_backwards")) == SCANS - 1
+    check_rows(bench.folder / "out_backwards", bench.good)
 
 
 @case

@@ -131,12 +131,38 @@ TEST(ScanSource, StampsHaveToMatchTheScans) {
   const TemporaryFolder folder;
   folder.Put("0.bin", kPoint);
   folder.Put("1.bin", kPoint);
-  const std::string cases[][2] = {
-      {"0\n", "1 lines for 2 scans"}, {"0\n1\n2\n", "3 lines for 2"}, {"0\nx\n", "times.txt:2"}};
+  const std::string cases[][2] = {{"0\n", "1 lines for 2 scans"},
+                                  {"0\nx\n", "times.txt:2"},
+                                  {"0\n2011-13-01 00:00:00\n", ":2"}};
   for (const auto& [text, words] : cases) {
     folder.Put("times.txt", text);
     ExpectOpenError(folder.Path(), words);
   }
+  folder.Put("beta.bin", kPoint);
+  folder.Put("times.txt", "0\n1\n2\n3\n");
+  ExpectOpenError(folder.Path(), "4 lines for 3");
+}
+
+TEST(ScanSource, APartOfARecordingTakesItsStampsByNumber) {
+  const TemporaryFolder folder;
+  folder.Put("velodyne/000001.bin", kPoint);
+  folder.Put("velodyne/000003.bin", kPoint);
+  folder.Put("times.txt", "0.0\n0.1\n0.2\n0.3\n");
+  const auto source = Open(folder);
+  EXPECT_EQ(source->Next()->value().stamp_s, 0.1);
+  EXPECT_EQ(source->Next()->value().stamp_s, 0.3);
+}
+
+TEST(ScanSource, KittiAsItWasRecorded) {
+  const TemporaryFolder folder;
+  folder.Put("velodyne_points/data/0000000000.bin", kPoint);
+  folder.Put("velodyne_points/data/0000000001.bin", kPoint);
+  folder.Put("velodyne_points/timestamps.txt",
+             "2011-09-26 13:02:25.594360375\n2011-09-26 13:02:25.697749613\n");
+  const auto source = Open(folder);
+  const double first_s = source->Next()->value().stamp_s;
+  EXPECT_NEAR(first_s, 1317042145.594360, 1e-6);
+  EXPECT_NEAR(source->Next()->value().stamp_s - first_s, 0.103389, 1e-6);
 }
 
 TEST(ScanSource, FoldersThatHoldNoRecordingAreErrorsThatSayWhatIsNeeded) {

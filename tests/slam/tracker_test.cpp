@@ -137,6 +137,18 @@ TEST_F(TrackerTest, TracksADriveAndDeskewsEveryScan) {
   }
 }
 
+TEST_F(TrackerTest, WithoutRefinementScansAreDeskewedByTheVelocityOfThoseBefore) {
+  TrackerConfig config;
+  config.deskew.refine = MotionModel::kRigid;
+  Tracker tracker(config, pool_);
+  TrackFirst(tracker, Drive, 3);  // the first twist is known after two
+  for (int k = 3; k < 10; ++k) {
+    const TrackResult result = tracker.Track(ScanOf(Drive, k), &map_);
+    ExpectAt(result, Drive(StampOf(k)));
+    EXPECT_LT(MedianMisfit(result.tracked.points, Drive(StampOf(k))), 3.0 * kNoise);
+  }
+}
+
 TEST_F(TrackerTest, DescribesTheSurfacesOfDeskewedPoints) {
   Tracker tracker({}, pool_);
   TrackFirst(tracker, Turn, 2);
