@@ -58,6 +58,38 @@ std::vector<Site> ChooseSites(const Keyframe& keyframe,
   return sites;
 }
 
+/// A measured point moved along its surface's normal to the middle of the measurements around it:
+/// that many times less of their noise is left.
+Eigen::Vector3f OnSurface(const Keyframe& keyframe,
+                          Site site,
+                          const Eigen::Vector3f& normal,
+                          const SpawnConfig& config) {
+  constexpr int kRows = 2;
+  constexpr int kColumns = 3;
+  const auto reach = static_cast<float>(config.smoothing_radius_m);
+  const auto band = static_cast<float>(config.smoothing_depth_m);
+  const auto point_at = [&](int row, int column) {
+    return keyframe.tracked.points[static_cast<std::size_t>(keyframe.point(row, column))];
+  };
+  const Eigen::Vector3f here = point_at(site.row, site.column);
+  const int columns = keyframe.point.Columns();
+  float sum = 0.0f;
+  int count = 0;
+  const int last_row = std::min(site.row + kRows, keyframe.point.Rows() - 1);
+  for (int row = std::max(site.row - kRows, 0); row <= last_row; ++row) {
+    for (int k = -kColumns; k <= kColumns; ++k) {
+      const int column = (site.column + k + columns) % columns;
+      if (keyframe.point(row, column) < 0) continue;
+      const Eigen::Vector3f offset = point_at(row, column) - here;
+      const float height = normal.dot(offset);
+      if (std::abs(height) > band || offset.squaredNorm() > reach * reach) continue;
+      sum += height;
+      ++count;
+    }
+  }
+  return count == 0 ? here : Eigen::Vector3f(here + sum / static_cast<float>(count) * normal);
+}
+
 /// Distance of neighbouring measurements on a surface, across the beams.
 double SamplingDistance(const SensorModel& sensor, int row, double range, double cosine) {
   const std::vector<double>& elevation = sensor.Elevations();
@@ -122,10 +154,9 @@ SpawnedGaussians SpawnGaussians(const Keyframe& keyframe,
   spawned.gaussians.Resize(sites.size());
   for (std::size_t i = 0; i < sites.size(); ++i) {
     const auto [row, column] = sites[i];
-    const auto point = static_cast<std::size_t>(keyframe.point(row, column));
     const auto surface = static_cast<std::size_t>(keyframe.surface(row, column));
-    const Eigen::Vector3f& mean = keyframe.tracked.points[point];
     const PointCovariance& covariance = keyframe.tracked.covariance[surface];
+    const Eigen::Vector3f mean = OnSurface(keyframe, sites[i], covariance.axes.col(2), config);
     const double range = mean.norm();
     const double cosine = std::abs(covariance.axes.col(2).dot(mean.normalized()));
     const double u = PhysicalConfidence(range, cosine, config.confidence);

@@ -26,6 +26,8 @@ struct SpawnConfig {
   double max_alpha = 0.5;
   double range_tolerance_m = 0.1;
   double range_tolerance_ratio = 0.01;
+  double smoothing_radius_m = 0.3;
+  double smoothing_depth_m = 0.1;
   ScaleRule scale_rule = ScaleRule::kSpacing;
   double spacing_factor = 0.5;
   double kappa = 0.1;
@@ -51,6 +53,14 @@ struct SpawnConfig {
             c.range_tolerance_ratio,
             Range{0.0, 1.0},
             "... plus this share of the range");
+    v.Field("smoothing_radius_m",
+            c.smoothing_radius_m,
+            Range{0.0, 5.0},
+            "a new Gaussian lies in the middle of the measurements around it as far as this ...");
+    v.Field("smoothing_depth_m",
+            c.smoothing_depth_m,
+            Range{0.0, 1.0},
+            "... and this near to its plane; 0: where its own measurement was");
     v.Field("scale_rule", c.scale_rule, "size of new Gaussians");
     v.Field("spacing_factor",
             c.spacing_factor,

@@ -1,5 +1,6 @@
 #include "covsplat/mapping/spawn.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -76,6 +77,12 @@ SpawnConfig By(ScaleRule rule) {
   return config;
 }
 
+SpawnConfig WithoutSmoothing() {
+  SpawnConfig config;
+  config.smoothing_depth_m = 0.0;
+  return config;
+}
+
 class SpawnGaussiansTest : public ::testing::Test {
  protected:
   SpawnedGaussians Spawn(const Keyframe& keyframe, const SpawnConfig& config = {}) {
@@ -96,7 +103,7 @@ class SpawnGaussiansTest : public ::testing::Test {
 };
 
 TEST_F(SpawnGaussiansTest, FillEveryVoxelOnceInAnEmptyMap) {
-  const SpawnConfig config;
+  const SpawnConfig config = WithoutSmoothing();
   const Keyframe keyframe = StillKeyframe(Room(), sensor_, SE3(), kNoise, 1, pool_);
   std::set<Cell> occupied;
   for (std::size_t i = 0; i < keyframe.point.Size(); ++i) {
@@ -117,11 +124,31 @@ TEST_F(SpawnGaussiansTest, SitOnMeasuredPoints) {
   const Keyframe keyframe = StillKeyframe(Room(), sensor_, SE3(), kNoise, 1, pool_);
   std::set<Triple> measured;
   for (const Eigen::Vector3f& p : keyframe.tracked.points) measured.insert({p[0], p[1], p[2]});
-  const SpawnedGaussians spawned = Spawn(keyframe);
+  const SpawnedGaussians spawned = Spawn(keyframe, WithoutSmoothing());
   ASSERT_GT(spawned.gaussians.Size(), 1000u);
   for (std::size_t i = 0; i < spawned.gaussians.Size(); ++i) {
     EXPECT_EQ(measured.count(MeanOf(spawned.gaussians, i)), 1u);
   }
+}
+
+TEST_F(SpawnGaussiansTest, AverageAwayMostOfTheNoiseOfTheirMeasurements) {
+  const Keyframe keyframe = StillKeyframe(Room(), sensor_, SE3(), kNoise, 1, pool_);
+  const auto median_distance = [&](const SpawnConfig& config) {
+    const GaussianColumns<float> table = Spawn(keyframe, config).gaussians;
+    std::vector<double> distance;
+    for (std::size_t i = 0; i < table.Size(); ++i) {
+      const Triple m = MeanOf(table, i);
+      const Eigen::Vector3d mean(m[0], m[1], m[2]);
+      const Eigen::Vector3d ray = mean.normalized();
+      const double cosine = std::abs(AxesOf(table, i).col(2).cast<double>().dot(ray));
+      distance.push_back(cosine *
+                         std::abs(Room().Cast(Eigen::Vector3d::Zero(), ray) - mean.norm()));
+    }
+    const auto middle = distance.begin() + static_cast<std::ptrdiff_t>(distance.size() / 2);
+    std::nth_element(distance.begin(), middle, distance.end());
+    return *middle;
+  };
+  EXPECT_LT(median_distance({}), 0.6 * median_distance(WithoutSmoothing()));
 }
 
 TEST_F(SpawnGaussiansTest, CoverARoomOnceAndNotTwice) {
