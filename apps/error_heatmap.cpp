@@ -1,6 +1,8 @@
 #include "apps/error_heatmap.hpp"
 
 #include <span>
+#include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -55,16 +57,36 @@ Result<void> WriteColouredMesh(const HeatmapOptions& options,
       options.file, ColouredPoints(vertices, errors_m, options.limit_m), mesh.triangles);
 }
 
+/// The judged points of the truth and their errors.
+std::pair<std::vector<Eigen::Vector3d>, std::vector<float>> JudgedTruth(
+    const ComparedSurfaces& surfaces, const SurfaceDistances& distances) {
+  std::pair<std::vector<Eigen::Vector3d>, std::vector<float>> judged;
+  for (std::size_t i = 0; i < surfaces.truth_points.size(); ++i) {
+    if (!surfaces.judged_truth.empty() && surfaces.judged_truth[i] == 0) continue;
+    judged.first.push_back(surfaces.truth_points[i]);
+    judged.second.push_back(distances.from_truth_m[i]);
+  }
+  return judged;
+}
+
 Result<void> WritePicture(const fs::path& path,
                           std::span<const Eigen::Vector3d> points,
                           std::span<const float> errors_m,
                           double limit_m) {
+  if (points.empty()) return {};
   const auto png = EncodePng(DrawErrorsFromAbove(points, errors_m, limit_m));
   if (!png) return Forward(png);
   return WriteFileAtomically(path, {reinterpret_cast<const char*>(png->data()), png->size()});
 }
 
 }  // namespace
+
+Result<void> CheckHeatmapFolder(const fs::path& file) {
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  std::error_code ignored;
+  if (fs::is_directory(folder, ignored)) return {};
+  return Fail(ErrorCode::kOutput, "{}: there is no folder {}", file.string(), folder.string());
+}
 
 Result<std::vector<fs::path>> WriteHeatmap(const HeatmapOptions& options,
                                            const ComparedSurfaces& surfaces,
@@ -89,8 +111,8 @@ Result<std::vector<fs::path>> WriteHeatmap(const HeatmapOptions& options,
                 paths[1], surfaces.result_points, distances.from_result_m, options.limit_m);
           })
           .and_then([&] {
-            return WritePicture(
-                paths[2], surfaces.truth_points, distances.from_truth_m, options.limit_m);
+            const auto [points, errors_m] = JudgedTruth(surfaces, distances);
+            return WritePicture(paths[2], points, errors_m, options.limit_m);
           });
   if (!written) return Forward(written);
   return paths;

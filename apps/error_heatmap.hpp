@@ -1,6 +1,7 @@
 // Where a surface is wrong: the surface itself with colours, and pictures from above.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <vector>
 
@@ -22,11 +23,15 @@ struct ComparedSurfaces {
   const SE3& T_truth_result;
   const std::vector<Eigen::Vector3d>& result_points;
   const std::vector<Eigen::Vector3d>& truth_points;
+  std::vector<std::uint8_t> judged_truth;  ///< one per point, or empty: all of them
 };
+
+/// Says early if there is no folder to write a heat map to.
+Result<void> CheckHeatmapFolder(const std::filesystem::path& file);
 
 /// Writes NAME.ply (the result's mesh or points in the truth's frame, with the scalar error_m and a
 /// colour each), NAME_accuracy.png (errors of the result) and NAME_completeness.png (errors of the
-/// truth); returns these paths.
+/// truth that is judged); returns these paths.
 Result<std::vector<std::filesystem::path>> WriteHeatmap(const HeatmapOptions& options,
                                                         const ComparedSurfaces& surfaces,
                                                         const SurfaceDistances& distances,

@@ -1,5 +1,7 @@
 #include "apps/map_evaluation.hpp"
 
+#include <chrono>
+
 #include "apps/error_heatmap.hpp"
 #include "apps/exit_code.hpp"
 #include "apps/progress.hpp"
@@ -66,13 +68,17 @@ Result<ObservedSpace> Observe(const MapEvaluationRequest& request,
   ProgressStatus status;
   status.total = (*source)->ScanCount();
   status.gaussians = -1;
-  for (; status.done < status.total; ++status.done) {
+  while (status.done < status.total) {
+    const auto start = std::chrono::steady_clock::now();
     const auto scan = (*source)->Next();
     if (!scan) {
       progress.Message("covsplat: warning: " + scan.error().message);
     } else if (*scan) {
       evaluation.returns += space.Add(**scan, truth);
     }
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+    ++status.done;
+    status.ms_per_scan = took.count();
     status.rss_bytes = ReadMemoryUse().rss_bytes;
     progress.Update(status);
   }
@@ -101,6 +107,10 @@ void Warn(const Surface& result, const Surface& truth, const SE3& T_truth_result
 
 Result<MapEvaluation> EvaluateMap(const MapEvaluationRequest& request) {
   MapEvaluation evaluation;
+  if (request.heatmap) {
+    const Result<void> writable = CheckHeatmapFolder(*request.heatmap);
+    if (!writable) return Forward(writable);
+  }
   const Result<Surface> result = LoadSurface(request.result);
   if (!result) return Forward(result);
   const Result<Surface> truth = LoadSurface(request.truth);
@@ -123,19 +133,20 @@ Result<MapEvaluation> EvaluateMap(const MapEvaluationRequest& request) {
 
   const SurfaceDistances distances = MeasureDistances(*result_points, *truth_points, pool);
   evaluation.paper = PaperError(distances, request.errors);
+  std::vector<std::uint8_t> visible;
   if (*true_poses) {
     const auto space = Observe(request, **true_poses, evaluation);
     if (!space) return Forward(space);
-    evaluation.strict = StrictError(distances,
-                                    space->InObservedSpace(*result_points, pool),
-                                    space->Visible(*truth_points, pool),
-                                    request.errors);
+    visible = space->Visible(*truth_points, pool);
+    evaluation.strict = StrictError(
+        distances, space->InObservedSpace(*result_points, pool), visible, request.errors);
   }
   if (!request.heatmap) return evaluation;
-  auto written = WriteHeatmap({*request.heatmap, request.heat_limit_m},
-                              {*result, evaluation.T_truth_result, *result_points, *truth_points},
-                              distances,
-                              pool);
+  auto written = WriteHeatmap(
+      {*request.heatmap, request.heat_limit_m},
+      {*result, evaluation.T_truth_result, *result_points, *truth_points, std::move(visible)},
+      distances,
+      pool);
   if (!written) return Forward(written);
   evaluation.written = std::move(*written);
   return evaluation;
