@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that covsplat needs and that are missing; says nothing if none is.
-# usage: tools/setup.sh [--with-dev]
+# usage: tools/setup.sh [--with-dev] [--with-oracles]
 set -euo pipefail
 
 packages=(
@@ -11,7 +11,8 @@ packages=(
 for argument in "$@"; do
   case "$argument" in
     --with-dev) packages+=(clang-format-14 clang-tidy-14) ;;
-    *) echo "usage: tools/setup.sh [--with-dev]" >&2; exit 2 ;;
+    --with-oracles) packages+=(python3-venv libusb-1.0-0 libgl1 libgomp1) ;;  # Open3D's
+    *) echo "usage: tools/setup.sh [--with-dev] [--with-oracles]" >&2; exit 2 ;;
   esac
 done
 

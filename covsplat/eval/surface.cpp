@@ -15,6 +15,7 @@ namespace {
 constexpr double kMaxSamples = 4e9;
 constexpr double kMaxCells = 1 << 20;  // that a grid reaches to either side
 constexpr double kOddRatio = 100.0;
+constexpr double kApart = 0.1;  // of the size of the truth
 
 /// Only a file with faces is a mesh.
 bool HasFaces(const PlyHeader& header) {
@@ -168,7 +169,7 @@ std::optional<std::string> OddBounds(const Eigen::AlignedBox3d& result,
         DiagonalOf(truth),
         std::max(ratio, 1.0 / ratio) > 300.0 ? "millimetres" : "other units");
   }
-  if (!result.intersects(truth)) {
+  if (result.exteriorDistance(truth) > kApart * DiagonalOf(truth)) {
     return fmt::format(
         "the result (x, y, z: {}) and the truth ({}) lie apart; are they in the same "
         "frame? --run and --recording move a run's map to the truth",

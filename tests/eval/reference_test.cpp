@@ -20,7 +20,7 @@ using Json = nlohmann::json;
 constexpr double kAgrees = 1e-6;  // metres, degrees, centimetres or percent
 
 std::filesystem::path Golden(const char* name) {
-  return std::filesystem::path(__FILE__).parent_path() / "../golden/eval" / name;
+  return std::filesystem::path(COVSPLAT_GOLDEN) / "eval" / name;
 }
 
 Json References() { return Json::parse(ReadFile(Golden("references.json")).value()); }
