@@ -13,8 +13,8 @@ namespace {
 TEST(ErrorPicture, ColumnsShowTheirMeanErrorWithYUp) {
   // The corners of 2 x 1 m; two points one above the other at the origin.
   const std::vector<Eigen::Vector3d> points = {{0, 0, 0}, {0, 0, 3}, {2, 0, 0}, {2, 1, 0}};
-  const std::vector<float> errors_m = {0.0f, 0.1f, 5.0f, 0.0f};
-  const Image<Rgb> picture = DrawErrorsFromAbove(points, errors_m, 0.1, 201);
+  const std::vector<float> errors_m = {0.0f, 0.125f, 5.0f, 0.0f};
+  const Image<Rgb> picture = DrawErrorsFromAbove(points, errors_m, 0.125, 201);
   ASSERT_EQ(picture.Columns(), 201);
   ASSERT_EQ(picture.Rows(), 101);
   EXPECT_EQ(picture(100, 0), DivergingColor(0.5));
