@@ -117,22 +117,26 @@ void AddFrameOptions(CLI::App& map, EvalMapOptions& options) {
 }
 
 void AddMeasureOptions(CLI::App& map, MapEvaluationRequest& request) {
-  map.add_option("--tau", request.errors.tau_m, "What counts as right, in metres; several at once")
+  map.add_option("--tau", request.errors.tau_m, "What counts as right; several at once")
       ->delimiter(',')
+      ->type_name("METRES")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  map.add_option("--voxel", request.sampling.voxel_m, "Both surfaces: one point per voxel, metres")
+  map.add_option("--voxel", request.sampling.voxel_m, "Both surfaces: one point per voxel")
+      ->type_name("METRES")
       ->check(CLI::Range(1e-4, 10.0))
       ->capture_default_str();
-  map.add_option("--truncation", request.errors.truncation_m, "No error counts for more, metres")
+  map.add_option("--truncation", request.errors.truncation_m, "No error counts for more")
+      ->type_name("METRES")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   map.add_option("--crop", request.errors.crop_m, "Paper: truth this far from the result is cut")
+      ->type_name("METRES")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  map.add_option("--visible",
-                 request.visibility.near_m,
-                 "Strict: truth this near to a return was visible, metres")
+  map.add_option(
+         "--visible", request.visibility.near_m, "Strict: truth this near to a return was visible")
+      ->type_name("METRES")
       ->check(CLI::Range(1e-3, 10.0))
       ->capture_default_str();
   map.add_option("--seed", request.sampling.seed, "Of the samples on meshes")
@@ -153,7 +157,8 @@ void AddEvalMapCommand(CLI::App& eval, int& exit_code) {
                   options->heatmap,
                   "Write the result coloured by its error, and pictures with the same name")
       ->type_name("FILE.ply");
-  map->add_option("--heat-limit", options->request.heat_limit_m, "Error in full red, metres")
+  map->add_option("--heat-limit", options->request.heat_limit_m, "Error in full red")
+      ->type_name("METRES")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   map->add_option("--threads", options->request.threads, "0: all that there are")

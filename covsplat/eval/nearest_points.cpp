@@ -16,6 +16,7 @@ constexpr std::size_t kGrain = 4096;
 struct Points {
   std::span<const Eigen::Vector3d> points;
 
+  // NOLINTBEGIN(readability-identifier-naming)
   std::size_t kdtree_get_point_count() const { return points.size(); }
   double kdtree_get_pt(std::size_t i, std::size_t axis) const {
     return points[i][static_cast<Eigen::Index>(axis)];
@@ -24,6 +25,7 @@ struct Points {
   bool kdtree_get_bbox(Box&) const {
     return false;
   }
+  // NOLINTEND(readability-identifier-naming)
 };
 
 using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Points>,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "covsplat/core/check.hpp"
 
@@ -101,9 +102,11 @@ std::size_t ObservedSpace::Add(const Scan& scan, const Trajectory& truth) {
 void ObservedSpace::AddRay(const Eigen::Vector3d& origin, std::uint64_t end) {
   const Eigen::Vector3d way = space_grid_.CenterOf(end) - origin;
   const int steps = static_cast<int>(std::ceil(2.0 * way.norm() / options_.space_m));
+  std::optional<std::uint64_t> last;
   for (int k = 0; k < steps; ++k) {
     const auto key = space_grid_.KeyOf(origin + way * (static_cast<double>(k) / steps));
-    if (key) space_.Insert(*key);
+    if (key && key != last) space_.Insert(*key);
+    last = key;
   }
 }
 

@@ -9,9 +9,12 @@ constexpr int kBits = 21;
 constexpr int kHalf = 1 << (kBits - 1);
 constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
 
+// The finaliser of SplitMix64: neighbours in space must not share slots, whichever bits they differ
+// in.
 std::uint64_t Scatter(std::uint64_t key) {
-  key *= 0x9E3779B97F4A7C15ULL;
-  return key ^ (key >> 29);
+  key = (key ^ (key >> 30)) * 0xBF58476D1CE4E5B9ULL;
+  key = (key ^ (key >> 27)) * 0x94D049BB133111EBULL;
+  return key ^ (key >> 31);
 }
 
 }  // namespace
