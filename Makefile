@@ -1,6 +1,6 @@
 # The short way to everything; CMake presets do the work.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test bench bench-peers check-map format tidy docs clean
+.PHONY: help setup demo test bench bench-peers oracles check-map format tidy docs clean
 
 COVSPLAT_DATA ?= ../shared/data
 THREADS ?= 2
@@ -41,6 +41,15 @@ bench-peers: setup build-release .venv/peers  ## Compare with KISS-ICP and small
 	  --recording bench_out/courtyard --data $(COVSPLAT_DATA) \
 	  --azimuth-time kitti_raw_0005=0.1033 --threads $(THREADS) --out bench_out \
 	  --update docs/benchmarks.md
+
+.venv/oracles: tools/oracles/requirements.txt
+	@tools/setup.sh --with-oracles
+	python3 -m venv .venv/oracles
+	.venv/oracles/bin/pip install --quiet --disable-pip-version-check -r $<
+	@touch $@
+
+oracles: setup build-release .venv/oracles  ## Check the metrics against evo and Open3D
+	.venv/oracles/bin/python tools/oracles/make_references.py --check build/release/apps/covsplat
 
 tools/node_modules: tools/package-lock.json
 	npm --prefix tools ci --no-audit --no-fund

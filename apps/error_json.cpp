@@ -37,8 +37,12 @@ Json DriftJson(const Drift& drift) {
 
 Json ErrorJson(const TrajectoryError& error) {
   return {{"matched", error.matched},
+          {"interpolated", error.interpolated},
           {"without_truth", error.without_truth},
+          {"outside_truth", error.outside_truth},
           {"not_finite", error.not_finite},
+          {"matched_from_s", error.first_matched_s},
+          {"matched_to_s", error.last_matched_s},
           {"ate_translation_m", Statistics(error.ate_translation_m)},
           {"ate_rotation_deg", Statistics(error.ate_rotation_deg)},
           {"rpe_by_pose", Relative(error.rpe_by_pose)},

@@ -140,6 +140,13 @@ std::string TodayAsText() {
   return text;
 }
 
+std::string SpreadOf(const HeldOutErrors& errors) {
+  return fmt::format("median {}, 90 % below {}, 95 % below {}",
+                     FormatMetres(errors.median_abs_m),
+                     FormatMetres(errors.p90_abs_m),
+                     FormatMetres(errors.p95_abs_m));
+}
+
 void AddDetails(const RunResults& results, ReportData& data) {
   const double keyframes = std::max<double>(1.0, static_cast<double>(results.keyframes));
   data.details = {{"sensor", results.sensor_verdict},
@@ -166,12 +173,13 @@ void AddDetails(const RunResults& results, ReportData& data) {
   if (const auto means = MeansOf(results.held_out)) {
     data.details.emplace_back(
         "held-out coverage",
-        fmt::format("{:.1f} % of the measured pixels as spawned, {:.1f} % optimised; median error "
-                    "{} and {}",
+        fmt::format("{:.1f} % of the measured pixels as spawned, {:.1f} % optimised",
                     100.0 * means->before.coverage,
-                    100.0 * means->after.coverage,
-                    FormatMetres(means->before.median_abs_m),
-                    FormatMetres(means->after.median_abs_m)));
+                    100.0 * means->after.coverage));
+    data.details.emplace_back(
+        "held-out depth error",
+        fmt::format(
+            "{} as spawned; {} optimised", SpreadOf(means->before), SpreadOf(means->after)));
   }
   if (results.truth) data.details.emplace_back("ground truth", results.truth->path.string());
 }

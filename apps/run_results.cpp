@@ -18,12 +18,16 @@ void AddScaled(const HeldOutErrors& errors, double weight, HeldOutErrors& sum) {
   sum.pixels += errors.pixels;
   sum.mean_abs_m += weight * errors.mean_abs_m;
   sum.median_abs_m += weight * errors.median_abs_m;
+  sum.p90_abs_m += weight * errors.p90_abs_m;
+  sum.p95_abs_m += weight * errors.p95_abs_m;
   sum.coverage += weight * errors.coverage;
 }
 
 Json ErrorsJson(const HeldOutErrors& errors) {
   return {{"mean_abs_m", errors.mean_abs_m},
           {"median_abs_m", errors.median_abs_m},
+          {"p90_abs_m", errors.p90_abs_m},
+          {"p95_abs_m", errors.p95_abs_m},
           {"coverage", errors.coverage},
           {"pixels", errors.pixels}};
 }

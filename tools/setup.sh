@@ -1,17 +1,18 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that covsplat needs and that are missing; says nothing if none is.
-# usage: tools/setup.sh [--with-dev]
+# usage: tools/setup.sh [--with-dev] [--with-oracles]
 set -euo pipefail
 
 packages=(
   build-essential cmake ninja-build python3
   libeigen3-dev libfmt-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev libhwy-dev libembree-dev
-  libpng-dev liblzf-dev libexpected-dev libgtest-dev libbenchmark-dev
+  libnanoflann-dev libpng-dev liblzf-dev libexpected-dev libgtest-dev libbenchmark-dev
 )
 for argument in "$@"; do
   case "$argument" in
     --with-dev) packages+=(clang-format-14 clang-tidy-14) ;;
-    *) echo "usage: tools/setup.sh [--with-dev]" >&2; exit 2 ;;
+    --with-oracles) packages+=(python3-venv libusb-1.0-0 libgl1 libgomp1) ;;  # Open3D's
+    *) echo "usage: tools/setup.sh [--with-dev] [--with-oracles]" >&2; exit 2 ;;
   esac
 done
 

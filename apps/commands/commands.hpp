@@ -20,8 +20,14 @@ void AddSimulateCommand(CLI::App& app, int& exit_code);
 /// info <recording | map.ply | run folder>
 void AddInfoCommand(CLI::App& app, int& exit_code);
 
-/// eval traj <estimate> <truth>
+/// eval traj | map
 void AddEvalCommand(CLI::App& app, int& exit_code);
+
+/// eval traj <estimate> <truth>
+void AddEvalTrajectoryCommand(CLI::App& eval, int& exit_code);
+
+/// eval map <mesh or cloud> <truth>
+void AddEvalMapCommand(CLI::App& eval, int& exit_code);
 
 /// config dump | check | describe
 void AddConfigCommand(CLI::App& app, int& exit_code);

@@ -17,8 +17,11 @@ constexpr std::array kShortLengthsM = {10.0, 20.0, 50.0};
 
 struct Matches {
   std::vector<SE3> estimate;
-  std::vector<SE3> truth;  // same size
+  std::vector<SE3> truth;        // same size
+  std::vector<double> stamps_s;  // same size
+  std::size_t interpolated = 0;
   std::size_t without_truth = 0;
+  std::size_t outside_truth = 0;
   std::size_t not_finite = 0;
 };
 
@@ -163,6 +166,12 @@ Drift DriftOf(const Matches& matches,
   return drift;
 }
 
+bool HasSampleAt(const Trajectory& trajectory, double stamp_s) {
+  const auto earlier = [](const TimedPose& pose, double stamp) { return pose.stamp_s < stamp; };
+  const auto at = std::lower_bound(trajectory.begin(), trajectory.end(), stamp_s, earlier);
+  return at != trajectory.end() && at->stamp_s == stamp_s;
+}
+
 Matches Associate(const Trajectory& estimate, const Trajectory& truth, double max_gap_s) {
   Matches matches;
   for (const TimedPose& pose : estimate) {
@@ -171,8 +180,12 @@ Matches Associate(const Trajectory& estimate, const Trajectory& truth, double ma
     } else if (const auto at = PoseAt(truth, pose.stamp_s, max_gap_s)) {
       matches.estimate.push_back(pose.T_world_sensor);
       matches.truth.push_back(*at);
+      matches.stamps_s.push_back(pose.stamp_s);
+      matches.interpolated += !HasSampleAt(truth, pose.stamp_s);
     } else {
       ++matches.without_truth;
+      matches.outside_truth += truth.empty() || pose.stamp_s < truth.front().stamp_s ||
+                               pose.stamp_s > truth.back().stamp_s;
     }
   }
   return matches;
@@ -228,7 +241,13 @@ TrajectoryError EvaluateTrajectory(const Trajectory& estimate,
   const Matches matches = Associate(estimate, truth, options.max_gap_s);
   TrajectoryError result;
   result.matched = matches.truth.size();
+  result.interpolated = matches.interpolated;
   result.without_truth = matches.without_truth;
+  result.outside_truth = matches.outside_truth;
+  if (result.matched > 0) {
+    result.first_matched_s = matches.stamps_s.front();
+    result.last_matched_s = matches.stamps_s.back();
+  }
   result.not_finite = matches.not_finite;
   result.T_truth_estimate = AlignmentOf(matches, options.alignment);
 

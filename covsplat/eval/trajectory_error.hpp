@@ -59,7 +59,9 @@ struct Drift {
 /// Poses of the estimate that have a truth, and everything measured on them.
 struct TrajectoryError {
   std::size_t matched = 0;
+  std::size_t interpolated = 0;   ///< of the matched ones: between two samples of the truth
   std::size_t without_truth = 0;  ///< finite poses of the estimate at times without truth
+  std::size_t outside_truth = 0;  ///< of these: before the truth begins or after it ends
   std::size_t not_finite = 0;     ///< poses of the estimate with NaN or infinity; ignored
   SE3 T_truth_estimate;           ///< the alignment, from the estimate's frame to the truth's
 
@@ -70,6 +72,8 @@ struct TrajectoryError {
   Drift kitti_drift;              ///< segments of 100, 200, ..., 800 m
   Drift short_drift;              ///< segments of 10, 20 and 50 m: not comparable with KITTI's
 
+  double first_matched_s = 0.0;    ///< time of the first matched pose
+  double last_matched_s = 0.0;     ///< and of the last
   double estimate_length_m = 0.0;  ///< path length over the matched poses
   double truth_length_m = 0.0;     ///< path length over the same poses
 };

@@ -46,7 +46,21 @@ std::string HeaderText(const PointTable& vertices) {
     COVSPLAT_CHECK(column.Size() == vertices.Rows() && !PlyTypeName(column.Type()).empty());
     text += fmt::format("property {} {}\n", PlyTypeName(column.Type()), column.name);
   }
-  return text + "end_header\n";
+  return text;
+}
+
+/// The vertices' header and bodies, with more header lines between them.
+std::string VertexBytes(const PointTable& vertices, const std::string& more_header) {
+  std::string bytes = HeaderText(vertices) + more_header + "end_header\n";
+  std::size_t stride = 0;
+  for (const PointColumn& column : vertices.columns) stride += SizeOf(column.Type());
+  std::size_t first = bytes.size();
+  bytes.resize(first + stride * vertices.Rows());
+  for (const PointColumn& column : vertices.columns) {
+    CopyBytes(column.values, bytes.data() + first, stride);
+    first += SizeOf(column.Type());
+  }
+  return bytes;
 }
 
 }  // namespace
@@ -98,14 +112,23 @@ Result<TriangleMesh> ParseTriangleMesh(std::string_view bytes, const std::string
 }
 
 Result<void> WritePly(const std::filesystem::path& path, const PointTable& vertices) {
-  std::string bytes = HeaderText(vertices);
-  std::size_t stride = 0;
-  for (const PointColumn& column : vertices.columns) stride += SizeOf(column.Type());
-  std::size_t first = bytes.size();
-  bytes.resize(first + stride * vertices.Rows());
-  for (const PointColumn& column : vertices.columns) {
-    CopyBytes(column.values, bytes.data() + first, stride);
-    first += SizeOf(column.Type());
+  return WriteFileAtomically(path, VertexBytes(vertices, ""));
+}
+
+Result<void> WritePlyMesh(const std::filesystem::path& path,
+                          const PointTable& vertices,
+                          std::span<const Eigen::Vector3i> triangles) {
+  std::string bytes = VertexBytes(vertices,
+                                  fmt::format("element face {}\nproperty list uchar int "
+                                              "vertex_indices\n",
+                                              triangles.size()));
+  bytes.reserve(bytes.size() + 13 * triangles.size());
+  for (const Eigen::Vector3i& triangle : triangles) {
+    bytes.push_back(3);
+    for (const std::int32_t corner : triangle) {
+      for (int shift = 0; shift < 32; shift += 8)
+        bytes.push_back(static_cast<char>(corner >> shift));
+    }
   }
   return WriteFileAtomically(path, bytes);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -21,6 +22,11 @@ Result<PointTable> ParsePly(std::string_view bytes, const std::string& file);
 Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path);
 /// The same from bytes in memory; `file` is for messages.
 Result<TriangleMesh> ParseTriangleMesh(std::string_view bytes, const std::string& file);
+
+/// Writes a mesh: vertices as below, and faces.
+Result<void> WritePlyMesh(const std::filesystem::path& path,
+                          const PointTable& vertices,
+                          std::span<const Eigen::Vector3i> triangles);
 
 /// Writes the vertices as binary_little_endian, at once. Comments must be single lines; columns of
 /// 64-bit integers do not exist in PLY.

@@ -1,5 +1,6 @@
 #include "covsplat/io/trajectory_file.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <optional>
@@ -7,6 +8,7 @@
 
 #include "covsplat/io/output_file.hpp"
 #include "covsplat/io/text.hpp"
+#include "covsplat/io/trajectory_csv.hpp"
 
 namespace covsplat {
 namespace {
@@ -56,6 +58,12 @@ std::optional<double> StampOf(std::string_view line) {
   if (words.size() == 1) return ParseDouble(words[0]);
   if (words.size() == 2) return DatedStamp(words[0], words[1]);
   return std::nullopt;
+}
+
+std::string WithoutCommas(std::string_view line) {
+  std::string words(line);
+  std::replace(words.begin(), words.end(), ',', ' ');
+  return words;
 }
 
 // Calls take(numbers) for every line with content; take returns what is wrong with it, or "".
@@ -155,19 +163,38 @@ Result<std::vector<double>> ReadStamps(const std::filesystem::path& path) {
   return stamps;
 }
 
-Result<Trajectory> LoadTrajectory(const std::filesystem::path& path,
-                                  std::span<const double> stamps_s) {
+Result<TrajectoryFormat> DetectTrajectoryFormat(const std::filesystem::path& path) {
   const Result<std::string> text = ReadFile(path);
   if (!text) return Forward(text);
   LineReader reader(*text);
-  if (!reader.NextWithContent()) {
-    return Fail(ErrorCode::kInput, "{}: holds no poses", path.string());
+  bool any = reader.NextWithContent();
+  // A line of names may come before the numbers of a CSV file.
+  if (any && reader.Number() == 1 && reader.Line().find(',') != std::string_view::npos &&
+      !ParseDoubles(WithoutCommas(reader.Line()))) {
+    any = reader.NextWithContent();
   }
-  const std::size_t columns = SplitWords(reader.Line()).size();
-  if (columns == 8) return ReadTum(path);
-  if (columns != 12) {
-    return BadLine(path, reader, "expected 8 numbers (TUM) or 12 (KITTI)");
-  }
+  if (!any) return Fail(ErrorCode::kInput, "{}: holds no poses", path.string());
+  const bool commas = reader.Line().find(',') != std::string_view::npos;
+  const std::size_t columns = SplitWords(WithoutCommas(reader.Line())).size();
+  if (!commas && columns == 8) return TrajectoryFormat::kTum;
+  if (!commas && columns == 12) return TrajectoryFormat::kKitti;
+  if (commas && columns == 9) return TrajectoryFormat::kNewerCollege;
+  if (commas && columns >= 8) return TrajectoryFormat::kEuroc;
+  return BadLine(path,
+                 reader,
+                 fmt::format("has {} columns{}; expected 8 numbers (TUM) or 12 (KITTI) between "
+                             "blanks, or 9 (Newer College) or 8 and more (EuRoC) between commas",
+                             columns,
+                             commas ? " between commas" : ""));
+}
+
+Result<Trajectory> LoadTrajectory(const std::filesystem::path& path,
+                                  std::span<const double> stamps_s) {
+  const Result<TrajectoryFormat> format = DetectTrajectoryFormat(path);
+  if (!format) return Forward(format);
+  if (*format == TrajectoryFormat::kTum) return ReadTum(path);
+  if (*format == TrajectoryFormat::kEuroc) return ReadEurocCsv(path);
+  if (*format == TrajectoryFormat::kNewerCollege) return ReadNewerCollegeCsv(path);
   const Result<std::vector<SE3>> poses = ReadKittiPoses(path);
   if (!poses) return Forward(poses);
   return WithStamps(*poses, stamps_s, path);

@@ -1,4 +1,5 @@
-// Trajectories as text: TUM (`stamp x y z qx qy qz qw`) and KITTI (12 numbers of a 3x4 matrix).
+// Trajectories as text: TUM (`stamp x y z qx qy qz qw`), KITTI (12 numbers of a 3x4 matrix), and
+// what trajectory_csv.hpp reads.
 #pragma once
 
 #include <filesystem>
@@ -28,8 +29,13 @@ Result<std::vector<SE3>> ReadKittiPoses(const std::filesystem::path& path);
 /// One number per line, as in the times.txt of a recording; not decreasing.
 Result<std::vector<double>> ReadStamps(const std::filesystem::path& path);
 
-/// TUM or KITTI, told by the number of columns. The lines of a KITTI file belong to `stamps_s`, one
-/// to one; for TUM these are not used.
+enum class TrajectoryFormat { kTum, kKitti, kEuroc, kNewerCollege };
+
+/// Told by the commas and the number of columns of the first row of numbers.
+Result<TrajectoryFormat> DetectTrajectoryFormat(const std::filesystem::path& path);
+
+/// In any of the formats. The lines of a KITTI file belong to `stamps_s`, one to one; others have
+/// their own times.
 Result<Trajectory> LoadTrajectory(const std::filesystem::path& path,
                                   std::span<const double> stamps_s);
 

@@ -5,6 +5,16 @@
 #include <numeric>
 
 namespace covsplat {
+namespace {
+
+/// The value that a share of all is below; reorders them.
+double AtShare(double share, std::vector<double>& values) {
+  const auto n = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size()));
+  std::nth_element(values.begin(), values.begin() + n, values.end());
+  return values[static_cast<std::size_t>(n)];
+}
+
+}  // namespace
 
 HeldOutErrors MeasureHeldOut(const Image<float>& measured_m, const Image<float>& rendered_m) {
   COVSPLAT_CHECK(measured_m.Size() == rendered_m.Size());
@@ -21,9 +31,9 @@ HeldOutErrors MeasureHeldOut(const Image<float>& measured_m, const Image<float>&
   if (errors.empty()) return result;
   const auto count = static_cast<double>(errors.size());
   result.mean_abs_m = std::accumulate(errors.begin(), errors.end(), 0.0) / count;
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  result.median_abs_m = *middle;
+  result.median_abs_m = AtShare(0.5, errors);
+  result.p90_abs_m = AtShare(0.9, errors);
+  result.p95_abs_m = AtShare(0.95, errors);
   result.coverage = count / static_cast<double>(measured);
   return result;
 }

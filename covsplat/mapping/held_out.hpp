@@ -13,6 +13,8 @@ struct HeldOutErrors {
   std::size_t pixels = 0;
   double mean_abs_m = 0.0;    ///< 0 if there are no such pixels
   double median_abs_m = 0.0;  ///< as above
+  double p90_abs_m = 0.0;     ///< nine of ten pixels are at least this good
+  double p95_abs_m = 0.0;     ///< and 19 of 20
   double coverage = 0.0;      ///< share of the measured pixels that are rendered
 };
 

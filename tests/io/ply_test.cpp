@@ -141,6 +141,26 @@ TEST(Ply, BinaryFacesAreReadAndTheirTruncationIsAnError) {
   }
 }
 
+TEST(Ply, AMeshIsReadAsItWasWritten) {
+  const TemporaryFolder folder;
+  const std::vector<Eigen::Vector3i> triangles = {{0, 1, 2}, {2, 1, 300}};
+  PointTable vertices;
+  for (const char* name : {"x", "y", "z", "error_m"}) {
+    std::vector<float> values(301);
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = 0.25f * static_cast<float>(i);
+    vertices.columns.push_back({name, std::move(values)});
+  }
+  ASSERT_TRUE(WritePlyMesh(folder.Path() / "m.ply", vertices, triangles));
+  const auto mesh = ReadTriangleMesh(folder.Path() / "m.ply");
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_EQ(mesh->triangles, triangles);
+  ASSERT_EQ(mesh->vertices.size(), 301u);
+  EXPECT_EQ(mesh->vertices[300], Eigen::Vector3f(75, 75, 75));
+  const auto table = ReadPly(folder.Path() / "m.ply");
+  ASSERT_TRUE(table) << table.error().message;
+  EXPECT_NE(table->Find("error_m"), nullptr);
+}
+
 TEST(Ply, DamagedHeadersAreErrorsWithTheLine) {
   ExpectError("", "first line");
   ExpectError("plyx\n", "first line");

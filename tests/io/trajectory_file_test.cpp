@@ -57,6 +57,51 @@ TEST(TrajectoryFile, KittiRoundTripNeedsTheStamps) {
   EXPECT_NE(LoadTrajectory(path, stamps).error().message.find("5 poses for 4"), std::string::npos);
 }
 
+constexpr const char* kEuroc =
+    "#timestamp [ns],p_x [m],p_y,p_z,q_w,q_x,q_y,q_z,v_x,v_y\n"
+    "1403636580838555648,1,2,3,0.5,-0.5,0.5,-0.5,9,9\n"
+    "1403636580843555648,1.5,2,3,1,0,0,0,9,9\n";
+constexpr const char* kNewerCollege =
+    "sec,nsec,x,y,z,qx,qy,qz,qw\r\n"
+    "1583840211, 44547840, 1,2,3, -0.5,0.5,-0.5,0.5\r\n"
+    "1583840211,144547840,1.5,2,3,0,0,0,1\r\n";
+
+TEST(TrajectoryFile, EurocAndNewerCollegeAreToldByTheirColumns) {
+  const TemporaryFolder folder;
+  const SE3 first(Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {1.0, 2.0, 3.0});
+  for (const auto& [text, stamp] :
+       {std::pair{kEuroc, 1403636580.838555648}, std::pair{kNewerCollege, 1583840211.044547840}}) {
+    const auto read = LoadTrajectory(folder.Put("t.csv", text), {});
+    ASSERT_TRUE(read) << read.error().message;
+    ASSERT_EQ(read->size(), 2u);
+    EXPECT_NEAR(read->front().stamp_s, stamp, 1e-6);
+    EXPECT_LT(Distance(read->front().T_world_sensor, first), 1e-12);
+    EXPECT_EQ(read->back().T_world_sensor.Translation().x(), 1.5);
+  }
+}
+
+TEST(TrajectoryFile, BadRowsOfCsvFilesAreNamedWithTheirLine) {
+  const TemporaryFolder folder;
+  const auto error = [&](const std::string& text) {
+    const auto read = LoadTrajectory(folder.Put("t.csv", text), {});
+    return read ? std::string("no error") : read.error().message;
+  };
+  const auto says = [&](const std::string& text, const char* part) {
+    EXPECT_NE(error(text).find(part), std::string::npos) << error(text);
+  };
+  const std::string euroc(kEuroc), newer(kNewerCollege);
+  says(euroc + "1403636580843555649,1,x,3,1,0,0,0,9,9\n", "t.csv:4: holds something");
+  says(euroc + "1403636580853555649,1,2,3,1,1,0,0,9,9\n", "t.csv:4: expected stamp");
+  says(euroc + "1403636580,1,2,3,1,0,0,0,9,9\n", "t.csv:4: its time is not later");
+  says("1403636580.5,1,2,3,1,0,0,0\n", "t.csv:1: expected stamp,x,y,z,qw");
+  says(newer + "1583840212,-1,1,2,3,0,0,0,1\n", "t.csv:4: expected sec,nsec");
+  says(newer + "1583840212,1,1,2,3,0,0,0\n", "t.csv:4: expected sec,nsec");
+  says(newer + "1583840212,1,1,2,3,nan,0,0,1\n", "t.csv:4: expected sec,nsec");
+  says("1,2,3,4,5\n", "t.csv:1: has 5 columns between commas");
+  says("sec,nsec,x\n", "holds no poses");
+  says("#only,names\n", "holds no poses");
+}
+
 TEST(TrajectoryFile, TheNumberOfColumnsTellsTheFormat) {
   const TemporaryFolder folder;
   const auto tum = folder.Put("tum", "# comment\n\n1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 0.999\n");

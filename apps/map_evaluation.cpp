@@ -1,0 +1,155 @@
+#include "apps/map_evaluation.hpp"
+
+#include <chrono>
+
+#include "apps/error_heatmap.hpp"
+#include "apps/exit_code.hpp"
+#include "apps/progress.hpp"
+#include "apps/run_truth.hpp"
+#include "apps/system_info.hpp"
+#include <fmt/format.h>
+
+#include "covsplat/eval/surface.hpp"
+#include "covsplat/io/scan_source.hpp"
+#include "covsplat/io/trajectory_file.hpp"
+
+namespace covsplat {
+namespace {
+
+constexpr double kScanPeriodS = 0.1;  // of recordings without times
+
+Result<std::optional<Trajectory>> LoadTruePoses(const MapEvaluationRequest& request) {
+  if (!request.recording) return std::optional<Trajectory>();
+  const auto truth = LoadTruth(*request.recording, request.true_poses, kScanPeriodS);
+  if (!truth) return Forward(truth);
+  if (!*truth) {
+    return Fail(ErrorCode::kInput,
+                "{}: holds no true poses, which tell what was visible; give them with --gt",
+                request.recording->string());
+  }
+  return std::optional((*truth)->trajectory);
+}
+
+/// Moves the result's frame to that of the truth.
+Result<void> Align(const MapEvaluationRequest& request,
+                   const std::optional<Trajectory>& truth,
+                   MapEvaluation& evaluation) {
+  if (request.T_truth_result) evaluation.T_truth_result = *request.T_truth_result;
+  if (!request.trajectory) return {};
+  if (!truth) {
+    return Fail(ErrorCode::kUsage,
+                "{} can only be aligned with true poses; name their recording with --recording",
+                request.trajectory->string());
+  }
+  const auto estimate = LoadForRecording(*request.trajectory, *request.recording, kScanPeriodS);
+  if (!estimate) return Forward(estimate);
+  const TrajectoryError error = EvaluateTrajectory(*estimate, *truth);
+  if (error.matched == 0) {
+    return Fail(ErrorCode::kInput,
+                "{}: no pose has a true one at its time in {}",
+                request.trajectory->string(),
+                request.recording->string());
+  }
+  evaluation.T_truth_result = error.T_truth_estimate;
+  evaluation.alignment = error;
+  return {};
+}
+
+/// Damaged scans are passed over with a warning, as a run does.
+Result<ObservedSpace> Observe(const MapEvaluationRequest& request,
+                              const Trajectory& truth,
+                              MapEvaluation& evaluation) {
+  const auto source = OpenScanSource(*request.recording, {});
+  if (!source) return Forward(source);
+  ObservedSpace space(request.visibility);
+  Progress::Options options;
+  options.quiet = request.quiet;
+  Progress progress(options);
+  ProgressStatus status;
+  status.total = (*source)->ScanCount();
+  status.gaussians = -1;
+  while (status.done < status.total) {
+    const auto start = std::chrono::steady_clock::now();
+    const auto scan = (*source)->Next();
+    if (!scan) {
+      progress.Message("covsplat: warning: " + scan.error().message);
+    } else if (*scan) {
+      evaluation.returns += space.Add(**scan, truth);
+    }
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+    ++status.done;
+    status.ms_per_scan = took.count();
+    status.rss_bytes = ReadMemoryUse().rss_bytes;
+    progress.Update(status);
+  }
+  if (evaluation.returns == 0) {
+    return Fail(ErrorCode::kInput,
+                "{}: none of its points has a true pose at its time",
+                request.recording->string());
+  }
+  return space;
+}
+
+JudgedSurface Judged(const std::filesystem::path& path,
+                     const Surface& surface,
+                     std::size_t points) {
+  return {path, surface.mesh.triangles.size(), points};
+}
+
+void Warn(const Surface& result, const Surface& truth, const SE3& T_truth_result) {
+  for (const std::string& remark : result.remarks) ReportWarning(remark);
+  for (const std::string& remark : truth.remarks) ReportWarning(remark);
+  const auto odd = OddBounds(BoundsOf(result, T_truth_result), BoundsOf(truth));
+  if (odd) ReportWarning(*odd);
+}
+
+}  // namespace
+
+Result<MapEvaluation> EvaluateMap(const MapEvaluationRequest& request) {
+  MapEvaluation evaluation;
+  if (request.heatmap) {
+    const Result<void> writable = CheckHeatmapFolder(*request.heatmap);
+    if (!writable) return Forward(writable);
+  }
+  const Result<Surface> result = LoadSurface(request.result);
+  if (!result) return Forward(result);
+  const Result<Surface> truth = LoadSurface(request.truth);
+  if (!truth) return Forward(truth);
+  const Result<std::optional<Trajectory>> true_poses = LoadTruePoses(request);
+  if (!true_poses) return Forward(true_poses);
+  const Result<void> aligned = Align(request, *true_poses, evaluation);
+  if (!aligned) return Forward(aligned);
+  Warn(*result, *truth, evaluation.T_truth_result);
+
+  ThreadPool pool(request.threads);
+  SamplingOptions truth_sampling = request.sampling;
+  ++truth_sampling.seed;  // other samples than the result's, even of the same surface
+  const auto result_points = PointsOf(*result, evaluation.T_truth_result, request.sampling, pool);
+  if (!result_points) return Forward(result_points);
+  const auto truth_points = PointsOf(*truth, {}, truth_sampling, pool);
+  if (!truth_points) return Forward(truth_points);
+  evaluation.result = Judged(request.result, *result, result_points->size());
+  evaluation.truth = Judged(request.truth, *truth, truth_points->size());
+
+  const SurfaceDistances distances = MeasureDistances(*result_points, *truth_points, pool);
+  evaluation.paper = PaperError(distances, request.errors);
+  std::vector<std::uint8_t> visible;
+  if (*true_poses) {
+    const auto space = Observe(request, **true_poses, evaluation);
+    if (!space) return Forward(space);
+    visible = space->Visible(*truth_points, pool);
+    evaluation.strict = StrictError(
+        distances, space->InObservedSpace(*result_points, pool), visible, request.errors);
+  }
+  if (!request.heatmap) return evaluation;
+  auto written = WriteHeatmap(
+      {*request.heatmap, request.heat_limit_m},
+      {*result, evaluation.T_truth_result, *result_points, *truth_points, std::move(visible)},
+      distances,
+      pool);
+  if (!written) return Forward(written);
+  evaluation.written = std::move(*written);
+  return evaluation;
+}
+
+}  // namespace covsplat
