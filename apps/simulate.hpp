@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "apps/config_options.hpp"
 #include "apps/exit_code.hpp"
 
 #include "covsplat/sim/simulation.hpp"
@@ -15,6 +16,10 @@ struct SimulateRequest {
   bool overwrite = false;
   bool quiet = false;
 };
+
+/// The configuration of a simulation whose section lidar starts from a preset: `sensor`, or what
+/// the files and assignments name if that is empty, or the default.
+Result<SimulationConfig> ResolveSimulation(const ConfigOptions& options, const std::string& sensor);
 
 /// Writes the recording with its ground truth. A signal (see InterruptGuard, which the caller
 /// holds) ends it early and leaves a shorter, whole recording.

@@ -65,7 +65,7 @@ SensorPreset LivoxMid70() {
   SensorPreset preset;
   preset.name = "livox-mid70";
   preset.description = "Livox Mid-70: a cone of 70.4 deg, 100,000 points/s, never the same twice";
-  preset.rosette = RosettePattern{35.2, 100000.0, 7294.0 / 60.0, -4664.0 / 60.0};
+  preset.rosette = RosettePattern();
   return WithBeam(WithRange(std::move(preset), 0.1, 200.0), 0.015, 0.0002, 2.7);
 }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "covsplat/core/config_field.hpp"
 #include "covsplat/core/result.hpp"
 #include "covsplat/core/sensor_model.hpp"
 
@@ -21,10 +22,21 @@ struct EvenBeams {
 /// One beam behind two turning prisms, as in a Livox: it draws a rosette that does not repeat from
 /// scan to scan and fills a cone about the x axis.
 struct RosettePattern {
-  double half_angle_deg = 0.0;
-  double points_per_s = 0.0;
-  double fast_prism_hz = 0.0;
-  double slow_prism_hz = 0.0;  ///< negative: against the fast one
+  double half_angle_deg = 35.2;
+  double points_per_s = 100000.0;
+  double fast_prism_hz = 7294.0 / 60.0;
+  double slow_prism_hz = -4664.0 / 60.0;  ///< negative: against the fast one
+
+  template <class Self, class V>
+  static void Visit(Self& c, V&& v) {
+    v.Field("half_angle_deg", c.half_angle_deg, Range{1.0, 80.0}, "of the cone that it fills");
+    v.Field("points_per_s", c.points_per_s, Range{10.0, 1e7}, "pulses per second");
+    v.Field("fast_prism_hz", c.fast_prism_hz, Range{-1000.0, 1000.0}, "turns per second");
+    v.Field("slow_prism_hz",
+            c.slow_prism_hz,
+            Range{-1000.0, 1000.0},
+            "turns per second; negative: against the fast one");
+  }
 };
 
 struct SensorPreset {

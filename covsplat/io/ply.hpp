@@ -26,4 +26,7 @@ Result<TriangleMesh> ParseTriangleMesh(std::string_view bytes, const std::string
 /// 64-bit integers do not exist in PLY.
 Result<void> WritePly(const std::filesystem::path& path, const PointTable& vertices);
 
+/// Writes vertices (float x y z) and faces (int vertex_indices) as binary_little_endian, at once.
+Result<void> WriteTriangleMesh(const std::filesystem::path& path, const TriangleMesh& mesh);
+
 }  // namespace covsplat
