@@ -7,10 +7,12 @@
 
 #include "apps/interrupt.hpp"
 #include "apps/progress.hpp"
+#include "apps/simulate_preview.hpp"
 #include "apps/system_info.hpp"
 #include <fmt/format.h>
 
 #include "covsplat/core/sensor_presets.hpp"
+#include "covsplat/io/output_file.hpp"
 #include "covsplat/io/recording_writer.hpp"
 #include "covsplat/report/format.hpp"
 
@@ -25,8 +27,9 @@ std::string SensorYaml(const SimulatedLidarConfig& lidar) {
       "# The sensor that made this recording: covsplat run RECORDING -c sensor.yaml\n";
   yaml += "sensor:\n";
   if (lidar.kind == LidarKind::kSpinning) {
+    const SensorModel model = ModelOf(lidar);
     std::vector<double> elevation_deg;
-    for (const double e : ModelOf(lidar).Elevations()) {
+    for (const double e : model.Elevations()) {
       elevation_deg.push_back(std::round(e * 180.0 / std::numbers::pi * 1e9) * 1e-9);
     }
     yaml += fmt::format("  elevation_deg: [{:.9g}]\n", fmt::join(elevation_deg, ", "));
@@ -133,6 +136,18 @@ ExitCode Simulate(const SimulateRequest& request) {
     std::fflush(stdout);
   }
   return Interrupted() ? kExitInterrupted : kExitOk;
+}
+
+ExitCode Preview(const SimulationConfig& config, const std::filesystem::path& file, double share) {
+  const Result<Simulation> simulation = Simulation::Create(config);
+  if (!simulation) return ReportError(simulation.error());
+  ThreadPool pool(CpuCount());
+  const double time_s = share * simulation->SensorMotion().Duration();
+  const auto png = PreviewPng(*simulation, time_s, pool);
+  if (!png) return ReportError(png.error());
+  const Result<void> written =
+      WriteFileAtomically(file, {reinterpret_cast<const char*>(png->data()), png->size()});
+  return written ? kExitOk : ReportError(written.error());
 }
 
 }  // namespace covsplat

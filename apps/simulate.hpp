@@ -25,4 +25,7 @@ Result<SimulationConfig> ResolveSimulation(const ConfigOptions& options, const s
 /// holds) ends it early and leaves a shorter, whole recording.
 ExitCode Simulate(const SimulateRequest& request);
 
+/// Writes a picture of the world, seen from `share` of the way.
+ExitCode Preview(const SimulationConfig& config, const std::filesystem::path& file, double share);
+
 }  // namespace covsplat

@@ -22,6 +22,8 @@ struct SimulateOptions {
   std::string sensor;
   std::string motion;
   std::string path;
+  std::string preview;
+  double preview_at = 0.5;
   bool overwrite = false;
   bool list = false;
   bool json = false;
@@ -77,12 +79,17 @@ ExitCode RunSimulate(const SimulateOptions& options) {
   if (options.world.empty() && options.config.files.empty()) {
     return ReportError({ErrorCode::kUsage, "name a world to simulate; --list shows what there is"});
   }
-  if (options.out.empty()) {
-    return ReportError({ErrorCode::kUsage, "choose a folder for the recording with -o"});
+  if (options.out.empty() && options.preview.empty()) {
+    return ReportError({ErrorCode::kUsage,
+                        "choose a folder for the recording with -o, or a picture with --preview"});
   }
   Result<SimulationConfig> config = ResolveSimulation(options.config, options.sensor);
   if (!config) return ReportError(config.error());
   ApplyFlags(options, *config);
+  if (!options.preview.empty()) {
+    const ExitCode drawn = Preview(*config, options.preview, options.preview_at);
+    if (drawn != kExitOk || options.out.empty()) return drawn;
+  }
   const InterruptGuard guard;
   return Simulate({*config, options.out, options.overwrite, options.quiet});
 }
@@ -112,6 +119,11 @@ void AddSimulateCommand(CLI::App& app, int& exit_code) {
       ->check(CLI::PositiveNumber);
   simulate->add_option("--seed", options->seed, "Of the world's details and of the walk")
       ->check(CLI::NonNegativeNumber);
+  simulate->add_option("--preview", options->preview, "Draw what is around the sensor; needs no -o")
+      ->type_name("FILE.png");
+  simulate->add_option("--preview-at", options->preview_at, "Where, as a share of the way")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1.0));
   AddConfigOptions(*simulate, options->config);
   simulate->add_flag("--quiet", options->quiet, "Print warnings and errors only");
   simulate->callback([options, &exit_code] { exit_code = RunSimulate(*options); });

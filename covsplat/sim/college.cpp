@@ -197,7 +197,7 @@ void AddFurniture(MeshBuilder& mesh, Rng& rng) {
   AddBench(mesh, {10.0f, 12.0f, 0.09f}, 0.0f);
   AddBench(mesh, {45.4f, 8.6f, 0.0f}, -kQuarter);
   AddBench(mesh, {37.1f, 15.8f, P::kTerraceZ}, 0.0f);
-  AddLampPost(mesh, {17.4f, 12.8f, 0.0f}, 3.6f);
+  AddLampPost(mesh, {15.4f, 12.6f, 0.0f}, 3.6f);
   AddLampPost(mesh, {43.4f, 10.6f, 0.0f}, 3.6f);
   AddLampPost(mesh, {31.4f, 2.2f, 0.0f}, 3.6f);
   for (const float y : {6.4f, 10.8f}) AddBollard(mesh, {20.6f, y, 0.0f});

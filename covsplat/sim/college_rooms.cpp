@@ -62,7 +62,7 @@ void AddDividingWall(MeshBuilder& mesh) {
   const float depth = kParlourWest - kHallEast;
   const WallSize size{kNorth - kSouth, CollegePlan::kFoundation, kCeiling};
   const std::vector<Opening> door = {
-      {-4.6f - kSouth, -3.2f - kSouth, CollegePlan::kFoundation, 2.3f, depth, true, 0.0f}};
+      {-4.6f - kSouth, -3.2f - kSouth, 0.0f, 2.3f, depth, true, 0.0f}};
   mesh.Wall(DividingWall(), size.width, size.z_low, size.z_high, door, kPlaster);
   AddRearFace(mesh, DividingWall(), size, depth, door, kPlaster);
 }
@@ -129,8 +129,8 @@ void FurnishParlour(MeshBuilder& mesh, Rng& rng) {
 }  // namespace
 
 std::vector<Opening> CollegeRoomDoors() {
-  return {{4.9f, 6.3f, CollegePlan::kFoundation, 2.4f, kThickness, true, 0.0f},
-          {13.9f, 15.3f, CollegePlan::kFoundation, 2.4f, kThickness, true, 0.0f}};
+  return {{4.9f, 6.3f, 0.0f, 2.4f, kThickness, true, 0.0f},
+          {13.9f, 15.3f, 0.0f, 2.4f, kThickness, true, 0.0f}};
 }
 
 void AddCollegeRooms(MeshBuilder& mesh, Rng& rng) {

@@ -48,7 +48,7 @@ class DrivingSpeed {
  private:
   static constexpr double kStepM = 0.5;
   static constexpr double kBendWindowM = 4.0;
-  static constexpr double kSidewaysMps2 = 3.2;
+  static constexpr double kSidewaysMps2 = 3.0;
   static constexpr double kForwardMps2 = 1.4;
   static constexpr double kStartMps = 0.3;
 

@@ -179,7 +179,7 @@ Route StreetRoute() {
   route.controls = StreetRing(static_cast<double>(P::kLane), 12.5);
   // Begin in the middle of the south side.
   std::rotate(route.controls.begin(), route.controls.begin() + 25, route.controls.end());
-  route.jitter_m = 0.05;
+  route.jitter_m = 0.02;
   route.ground = StreetGround;
   return route;
 }

@@ -19,7 +19,7 @@ struct StreetPlan {
   static constexpr float kLane = 1.6f;      // middle of a lane
   static constexpr float kParked = 4.4f;    // middle of the parking bays
   static constexpr float kKerb = 5.5f;
-  static constexpr float kHouses = 8.8f;
+  static constexpr float kHouses = 10.0f;
   static constexpr float kKerbHeight = 0.13f;
   static constexpr float kBeyond = 45.0f;  // the ground ends
 };

@@ -41,7 +41,7 @@ class Verge {
 };
 
 void AddTrees(MeshBuilder& mesh, double side, Rng& rng) {
-  const Verge verge(side * 6.7);
+  const Verge verge(side * 6.4);
   for (double at = rng.Uniform(4.0, 12.0); at < verge.Length(); at += rng.Uniform(17.0, 26.0)) {
     const auto height = static_cast<float>(rng.Uniform(5.5, 8.0));
     const auto crown = static_cast<float>(rng.Uniform(1.5, 2.2));
@@ -86,7 +86,7 @@ void AddSmallThings(MeshBuilder& mesh, double side, Rng& rng) {
         mesh.Box(base, {0.9f, 0.4f, 1.3f}, yaw, 0.3f);  // a switch box
     }
   }
-  const Verge back(side * 7.7);
+  const Verge back(side * 6.8);
   for (double at = 45.0; at < back.Length(); at += rng.Uniform(70.0, 110.0)) {
     if (!back.IsStraight(at, 8.0)) continue;
     const Vector3f base = back.At(at, P::kKerbHeight);

@@ -58,7 +58,7 @@ std::vector<Mover> StreetTraffic(int seed) {
     const double speed_mps = rng.Uniform(1.1, 1.5);
     movers.push_back(MakeMover(std::make_shared<const Scene>(PersonShape(rng)),
                                PointLabel::kMovingPerson,
-                               Stroll(side * 7.25, from_m, length_m, speed_mps)));
+                               Stroll(side * 8.3, from_m, length_m, speed_mps)));
   }
   return movers;
 }

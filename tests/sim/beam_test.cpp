@@ -119,7 +119,8 @@ TEST(WorldSnapshot, MoversAreWhereTheyAreAtThatTime) {
     EXPECT_EQ(hit->label, PointLabel::kMovingCar);
     EXPECT_NEAR(hit->range_m, 4.5f / at_box.x(), 1e-4f);
     EXPECT_NEAR(hit->normal.x(), -1.0f, 1e-5f);
-    const Vector3f past_it = Eigen::Vector3d(4.5, y + 0.7, 0.0).normalized().cast<float>();
+    const Vector3f past_it =
+        Eigen::Vector3d(4.5, y + (y < 0.0 ? -0.7 : 0.7), 0.0).normalized().cast<float>();
     EXPECT_EQ(world.Look(past_it)->label, PointLabel::kStatic);
   }
 }
