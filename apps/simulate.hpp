@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "apps/config_options.hpp"
 #include "apps/exit_code.hpp"
 
 #include "covsplat/sim/simulation.hpp"
@@ -16,8 +17,15 @@ struct SimulateRequest {
   bool quiet = false;
 };
 
+/// The configuration of a simulation whose section lidar starts from a preset: `sensor`, or what
+/// the files and assignments name if that is empty, or the default.
+Result<SimulationConfig> ResolveSimulation(const ConfigOptions& options, const std::string& sensor);
+
 /// Writes the recording with its ground truth. A signal (see InterruptGuard, which the caller
 /// holds) ends it early and leaves a shorter, whole recording.
 ExitCode Simulate(const SimulateRequest& request);
+
+/// Writes a picture of the world, seen from `share` of the way.
+ExitCode Preview(const SimulationConfig& config, const std::filesystem::path& file, double share);
 
 }  // namespace covsplat

@@ -9,6 +9,7 @@ find_package(nlohmann_json 3.11 REQUIRED)
 find_package(PNG REQUIRED)
 find_package(tl-expected 1.0 REQUIRED)
 find_package(embree 3 REQUIRED)
+find_package(assimp 5.2 REQUIRED)
 find_package(nanoflann 1.4 REQUIRED)
 
 find_package(hwy REQUIRED)

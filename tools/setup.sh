@@ -6,7 +6,8 @@ set -euo pipefail
 packages=(
   build-essential cmake ninja-build python3
   libeigen3-dev libfmt-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev libhwy-dev libembree-dev
-  libnanoflann-dev libpng-dev liblzf-dev libexpected-dev libgtest-dev libbenchmark-dev
+  libassimp-dev libnanoflann-dev libpng-dev liblzf-dev libexpected-dev libgtest-dev
+  libbenchmark-dev
 )
 for argument in "$@"; do
   case "$argument" in

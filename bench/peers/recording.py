@@ -49,7 +49,7 @@ class Recording:
 
     @property
     def is_simulated(self) -> bool:
-        return (self.folder / "groundtruth_tum.txt").is_file()
+        return (self.folder / "gt_tum.txt").is_file()
 
     @property
     def has_point_times(self) -> bool:
@@ -77,7 +77,7 @@ class Recording:
     def truth(self) -> Trajectory:
         """Exact and at any time if simulated, else the reference at the stamps."""
         if self.is_simulated:
-            return Trajectory.read_tum(self.folder / "groundtruth_tum.txt")
+            return Trajectory.read_tum(self.folder / "gt_tum.txt")
         rows = np.loadtxt(self.folder / "poses_reference.txt", ndmin=2).reshape(-1, 3, 4)
         poses = np.concatenate([rows, np.tile([[[0.0, 0, 0, 1]]], (len(rows), 1, 1))], 1)
         return Trajectory.from_matrices(self.stamps_s, poses)

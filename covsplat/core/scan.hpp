@@ -18,6 +18,7 @@ struct Scan {
   std::vector<Eigen::Vector3f> points;  ///< [N] m
   std::vector<float> intensity;         ///< [N] or empty; the recording's own unit
   std::vector<float> time_offset_s;     ///< [N] or empty: time of the point - stamp_s
+  std::vector<std::uint32_t> label;     ///< [N] or empty; class, numbered as in SemanticKITTI
   std::string source;                   ///< file it came from, for messages
 };
 

@@ -79,7 +79,7 @@ Result<std::optional<GroundTruth>> FindGroundTruth(const fs::path& recording,
   const auto found = [](const fs::path& path, const Result<Trajectory>& trajectory) {
     return trajectory.map([&](const Trajectory& t) { return std::optional(GroundTruth{path, t}); });
   };
-  const fs::path dense = recording / "groundtruth_tum.txt";
+  const fs::path dense = recording / "gt_tum.txt";
   if (Exists(dense)) return found(dense, ReadTum(dense));
   const fs::path own = recording / "poses.txt";
   const fs::path path = Exists(own) ? own : OdometryPoses(recording);

@@ -15,7 +15,7 @@ struct GroundTruth {
 };
 
 /// Looks, in this order, for
-///  - `groundtruth_tum.txt`: the sensor's pose at any times,
+///  - `gt_tum.txt`: the sensor's pose at any times,
 ///  - `poses.txt`: its 3x4 poses at the times of times.txt,
 ///  - `../../poses/NN.txt` of a KITTI odometry folder `sequences/NN`: poses of the left camera,
 ///    turned into those of the LiDAR with the `Tr` of calib.txt.

@@ -133,4 +133,25 @@ Result<void> WritePlyMesh(const std::filesystem::path& path,
   return WriteFileAtomically(path, bytes);
 }
 
+Result<void> WriteTriangleMesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  std::string bytes = fmt::format(
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\n"
+      "property float y\nproperty float z\nelement face {}\n"
+      "property list uchar int vertex_indices\nend_header\n",
+      mesh.vertices.size(),
+      mesh.triangles.size());
+  constexpr std::size_t kVertexBytes = 3 * sizeof(float);
+  constexpr std::size_t kFaceBytes = 1 + 3 * sizeof(int);
+  bytes.reserve(bytes.size() + kVertexBytes * mesh.vertices.size() +
+                kFaceBytes * mesh.triangles.size());
+  for (const Eigen::Vector3f& vertex : mesh.vertices) {
+    bytes.append(reinterpret_cast<const char*>(vertex.data()), kVertexBytes);
+  }
+  for (const Eigen::Vector3i& triangle : mesh.triangles) {
+    bytes.push_back(3);
+    bytes.append(reinterpret_cast<const char*>(triangle.data()), kFaceBytes - 1);
+  }
+  return WriteFileAtomically(path, bytes);
+}
+
 }  // namespace covsplat

@@ -32,4 +32,7 @@ Result<void> WritePlyMesh(const std::filesystem::path& path,
 /// 64-bit integers do not exist in PLY.
 Result<void> WritePly(const std::filesystem::path& path, const PointTable& vertices);
 
+/// Writes vertices (float x y z) and faces (int vertex_indices) as binary_little_endian, at once.
+Result<void> WriteTriangleMesh(const std::filesystem::path& path, const TriangleMesh& mesh);
+
 }  // namespace covsplat

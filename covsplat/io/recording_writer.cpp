@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "covsplat/core/check.hpp"
+#include "covsplat/io/ply.hpp"
 #include "covsplat/io/trajectory_file.hpp"
 
 namespace covsplat {
@@ -14,17 +15,27 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kMarker = ".covsplat_recording";
-constexpr std::array<const char*, 2> kBinaryFolders = {"velodyne", "timestamps"};
 
-std::string BinaryName(std::int64_t index) { return fmt::format("{:06}.bin", index); }
+struct NumberedFiles {
+  const char* folder;
+  const char* extension;
+};
+constexpr std::array kNumberedFiles = {NumberedFiles{"velodyne", ".bin"},
+                                       NumberedFiles{"timestamps", ".bin"},
+                                       NumberedFiles{"labels", ".label"}};
+constexpr std::array kSingleFiles = {"gt_tum.txt", "gt_mesh.ply", "sensor.yaml"};
+
+std::string NumberedName(std::int64_t index, const char* extension) {
+  return fmt::format("{:06}{}", index, extension);
+}
 
 // Removes what this class wrote and does not open anew; its scans are numbered without a gap.
 void RemoveOldRecording(const fs::path& folder) {
   std::error_code ignored;
-  fs::remove(folder / "groundtruth_tum.txt", ignored);
-  for (const char* name : kBinaryFolders) {
+  for (const char* name : kSingleFiles) fs::remove(folder / name, ignored);
+  for (const auto& [name, extension] : kNumberedFiles) {
     std::int64_t index = 0;
-    while (fs::remove(folder / name / BinaryName(index), ignored)) ++index;
+    while (fs::remove(folder / name / NumberedName(index, extension), ignored)) ++index;
   }
 }
 
@@ -38,7 +49,7 @@ Result<void> PrepareFolder(const fs::path& folder, bool overwrite) {
                 folder.string());
   }
   if (!error && fs::exists(folder / kMarker, error)) RemoveOldRecording(folder);
-  for (const char* name : kBinaryFolders) {
+  for (const auto& [name, extension] : kNumberedFiles) {
     if (!error) fs::create_directories(folder / name, error);
     if (!error && !fs::is_empty(folder / name, error)) {
       return Fail(ErrorCode::kOutput,
@@ -90,32 +101,51 @@ Result<RecordingWriter> RecordingWriter::Create(const fs::path& folder, bool ove
 Result<void> RecordingWriter::Write(const Scan& scan, const SE3& T_world_sensor) {
   COVSPLAT_CHECK(scan.intensity.empty() || scan.intensity.size() == scan.points.size());
   const std::int64_t index = count_++;
-  const fs::path file = folder_ / "velodyne" / BinaryName(index);
+  const fs::path file = folder_ / "velodyne" / NumberedName(index, ".bin");
   return WriteBinary(file, BytesOf(Records(scan)))
-      .and_then([&] { return WritePointTimes(scan, index); })
+      .and_then([&] {
+        const std::vector<float>& times = scan.time_offset_s;
+        return WriteColumn(times_of_points_, scan, index, times.size(), BytesOf(times));
+      })
+      .and_then(
+          [&] { return WriteColumn(labels_, scan, index, scan.label.size(), BytesOf(scan.label)); })
       .and_then([&] { return poses_.Append(KittiLine(T_world_sensor)); })
       .and_then([&] { return times_.Append(fmt::format("{:.9f}\n", scan.stamp_s)); });
 }
 
-Result<void> RecordingWriter::WritePointTimes(const Scan& scan, std::int64_t index) {
-  const bool has_times = !scan.time_offset_s.empty();
-  COVSPLAT_CHECK(!has_times || scan.time_offset_s.size() == scan.points.size());
-  const bool first_with_points = !has_point_times_ && !scan.points.empty();
+Result<void> RecordingWriter::WriteColumn(Column& column,
+                                          const Scan& scan,
+                                          std::int64_t index,
+                                          std::size_t values,
+                                          std::string_view bytes) {
+  COVSPLAT_CHECK(values == 0 || values == scan.points.size());
+  const bool first_with_points = !column.present && !scan.points.empty();
   if (!scan.points.empty()) {
-    COVSPLAT_CHECK(has_point_times_.value_or(has_times) == has_times);
-    has_point_times_ = has_times;
+    COVSPLAT_CHECK(column.present.value_or(values > 0) == (values > 0));
+    column.present = values > 0;
   }
-  if (!has_point_times_.value_or(false)) return {};
-  // Scans without points that came before any with points have no times either.
+  if (!column.present.value_or(false)) return {};
+  const auto path = [&](std::int64_t scan_index) {
+    return folder_ / column.folder / NumberedName(scan_index, column.extension);
+  };
+  // Scans without points that came before any with points have no values either.
   for (std::int64_t i = first_with_points ? 0 : index; i < index; ++i) {
-    const Result<void> none = WriteBinary(folder_ / "timestamps" / BinaryName(i), "");
+    const Result<void> none = WriteBinary(path(i), "");
     if (!none) return none;
   }
-  return WriteBinary(folder_ / "timestamps" / BinaryName(index), BytesOf(scan.time_offset_s));
+  return WriteBinary(path(index), bytes);
+}
+
+Result<void> RecordingWriter::WriteMesh(const TriangleMesh& mesh) {
+  return WriteTriangleMesh(folder_ / "gt_mesh.ply", mesh);
+}
+
+Result<void> RecordingWriter::WriteSensor(std::string_view yaml) {
+  return WriteFileAtomically(folder_ / "sensor.yaml", yaml);
 }
 
 Result<void> RecordingWriter::Finish(const Trajectory& dense_truth) {
-  const Result<void> truth = WriteTum(folder_ / "groundtruth_tum.txt", dense_truth);
+  const Result<void> truth = WriteTum(folder_ / "gt_tum.txt", dense_truth);
   if (!truth) return truth;
   return times_.Close().and_then([&] { return poses_.Close(); });
 }

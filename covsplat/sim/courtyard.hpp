@@ -2,11 +2,8 @@
 // origin in the middle. No two sides are alike.
 #pragma once
 
-#include <vector>
-
-#include <Eigen/Core>
-
 #include "covsplat/sim/mesh_builder.hpp"
+#include "covsplat/sim/path.hpp"
 
 namespace covsplat {
 
@@ -15,8 +12,7 @@ WorldMesh MakeCourtyard(int seed);
 /// Height in metres of the walkable ground: smooth, without kerbs and steps.
 double CourtyardGround(double x, double y);
 
-/// A walk round the courtyard and through the arcade that keeps clear of everything: control points
-/// [m] of a closed, smooth path in the plane.
-std::vector<Eigen::Vector2d> CourtyardRoute();
+/// A walk round the courtyard and through the arcade that keeps clear of everything.
+Route CourtyardRoute();
 
 }  // namespace covsplat

@@ -3,6 +3,7 @@
 #include <numbers>
 #include <vector>
 
+#include "covsplat/sim/buildings.hpp"
 #include "covsplat/sim/courtyard.hpp"
 #include "covsplat/sim/props.hpp"
 
@@ -16,7 +17,6 @@ constexpr float kStone = 0.6f;
 constexpr float kPlaster = 0.7f;
 constexpr float kBrick = 0.4f;
 constexpr float kTiles = 0.3f;
-constexpr float kDoor = 0.25f;
 constexpr float kFoundation = -0.6f;  // walls begin below the lowest ground
 constexpr float kArcadeY = 9.0f;
 constexpr float kPassageDepth = 8.0f;
@@ -31,41 +31,11 @@ Panel NorthWall() { return {{-15.0f, 12.0f, 0.0f}, Vector3f::UnitX(), -Vector3f:
 Panel WestWall() { return {{-15.0f, -12.0f, 0.0f}, Vector3f::UnitY(), Vector3f::UnitX()}; }
 Panel ArcadeFront() { return {{-15.0f, kArcadeY, 0.0f}, Vector3f::UnitX(), -Vector3f::UnitY()}; }
 
-Opening Door(float u, float width, float z, float height) {
-  return {u, u + width, z, z + height, 0.45f, false, kDoor};
-}
-
-// A wall with doors and, between them, windows.
-void AddFacade(MeshBuilder& mesh,
-               const Panel& panel,
-               const Vector2f& width_and_height,
-               const std::vector<Opening>& doors,
-               const WindowGrid& grid,
-               float reflectivity,
-               Rng& rng) {
-  const std::vector<Opening> windows = MakeWindows(grid, doors, rng);
-  std::vector<Opening> openings = doors;
-  openings.insert(openings.end(), windows.begin(), windows.end());
-  mesh.Wall(panel, width_and_height.x(), kFoundation, width_and_height.y(), openings, reflectivity);
-  AddWindowFrames(mesh, panel, windows);
-}
-
-// Rises by `rise` over `run` behind the top of a wall, with eaves 0.5 m in front of it.
-void AddRoof(
-    MeshBuilder& mesh, const Panel& panel, float width, float eaves, float run, float rise) {
-  const float drop = 0.5f * rise / run;
-  mesh.Quad(panel.At(0.0f, eaves - drop, -0.5f),
-            panel.At(width, eaves - drop, -0.5f),
-            panel.At(width, eaves + rise, run),
-            panel.At(0.0f, eaves + rise, run),
-            kTiles);
-}
-
 void AddSouthSide(MeshBuilder& mesh, Rng& rng) {
   const Panel panel = SouthWall();
   AddFacade(mesh,
             panel,
-            {30.0f, 9.0f},
+            {30.0f, kFoundation, 9.0f},
             {Door(5.6f, 1.4f, -0.2f, 2.6f), Door(21.0f, 2.2f, -0.2f, 3.0f)},
             {1.6f, 2.9f, 10, 1.2f, 1.7f, {1.1f, 4.0f, 6.8f}},
             kBrick,
@@ -121,7 +91,7 @@ void AddArcade(MeshBuilder& mesh) {
 void AddNorthSide(MeshBuilder& mesh, Rng& rng) {
   AddFacade(mesh,
             NorthWall(),
-            {30.0f, 11.0f},
+            {30.0f, kFoundation, 11.0f},
             {Door(4.0f, 1.2f, -0.2f, 2.4f),
              Door(14.2f, 1.8f, -0.2f, 2.8f),
              Door(24.5f, 1.2f, -0.2f, 2.4f)},
@@ -154,7 +124,7 @@ void AddEastSide(MeshBuilder& mesh, Rng& rng) {
   const Panel panel = EastWall();
   AddFacade(mesh,
             panel,
-            {24.0f, 12.0f},
+            {24.0f, kFoundation, 12.0f},
             {Door(3.0f, 1.6f, -0.2f, 2.7f), Door(15.8f, 1.3f, 1.65f, 2.4f)},
             {1.2f, 3.7f, 6, 1.5f, 2.2f, {1.2f, 4.8f, 8.4f}},
             kPlaster,
@@ -176,7 +146,7 @@ void AddWestSide(MeshBuilder& mesh, Rng& rng) {
   const Panel low = WestWall();
   AddFacade(mesh,
             low,
-            {kLowWidth, 8.0f},
+            {kLowWidth, kFoundation, 8.0f},
             {Door(2.6f, 1.3f, -0.2f, 2.5f)},
             {1.0f, 2.6f, 5, 1.1f, 1.5f, {1.2f, 5.2f}},
             kStone,
@@ -186,7 +156,7 @@ void AddWestSide(MeshBuilder& mesh, Rng& rng) {
   const Panel high{low.At(kLowWidth, 0.0f), low.along, low.outward};
   AddFacade(mesh,
             high,
-            {11.0f, 10.7f},
+            {11.0f, kFoundation, 10.7f},
             {{0.6f, 4.4f, kFoundation, 3.7f, kPassageDepth, true, 0.0f}},
             {1.2f, 2.9f, 3, 1.2f, 1.8f, {1.3f, 4.9f, 8.0f}},
             kPlaster,
@@ -203,7 +173,7 @@ void AddStreet(MeshBuilder& mesh, Rng& rng) {
   const Panel house{{-40.0f, -20.0f, 0.0f}, Vector3f::UnitY(), Vector3f::UnitX()};
   AddFacade(mesh,
             house,
-            {40.0f, 11.0f},
+            {40.0f, kFoundation, 11.0f},
             {Door(22.0f, 1.6f, -0.3f, 2.8f)},
             {1.5f, 2.8f, 13, 1.3f, 1.7f, {1.0f, 4.2f, 7.4f}},
             kBrick,

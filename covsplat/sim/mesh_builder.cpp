@@ -88,6 +88,16 @@ void MeshBuilder::Triangle(int a, int b, int c, float reflectivity) {
   mesh_.reflectivity.push_back(reflectivity);
 }
 
+void MeshBuilder::Facet(const Vector3f& a,
+                        const Vector3f& b,
+                        const Vector3f& c,
+                        float reflectivity) {
+  const int first = Vertex(a);
+  Vertex(b);
+  Vertex(c);
+  Triangle(first, first + 1, first + 2, reflectivity);
+}
+
 void MeshBuilder::Quad(const Vector3f& a,
                        const Vector3f& b,
                        const Vector3f& c,
@@ -148,10 +158,10 @@ void MeshBuilder::Ellipsoid(const Vector3f& centre,
                             int subdivisions,
                             float reflectivity) {
   for (const auto& [a, b, c] : Icosphere(subdivisions)) {
-    const int first = Vertex(centre + radii.cwiseProduct(a));
-    Vertex(centre + radii.cwiseProduct(b));
-    Vertex(centre + radii.cwiseProduct(c));
-    Triangle(first, first + 1, first + 2, reflectivity);
+    Facet(centre + radii.cwiseProduct(a),
+          centre + radii.cwiseProduct(b),
+          centre + radii.cwiseProduct(c),
+          reflectivity);
   }
 }
 
@@ -193,6 +203,7 @@ void MeshBuilder::Recess(const Panel& panel, const Opening& opening, float refle
     return panel.At(edge[k % 4].x(), edge[k % 4].y(), depth);
   };
   const float back = opening.depth;
+  if (back <= 0.0f) return;
   for (std::size_t k = 0; k < 4; ++k) {
     Quad(corner(k, 0.0f), corner(k + 1, 0.0f), corner(k + 1, back), corner(k, back), reflectivity);
   }

@@ -29,7 +29,7 @@ struct Panel {
 };
 
 /// A rectangular hole in a panel, with side walls `depth` deep and, unless it leads through, a
-/// back.
+/// back. With depth 0 it is nothing but a hole.
 struct Opening {
   float u_low = 0.0f;
   float u_high = 0.0f;
@@ -43,6 +43,11 @@ struct Opening {
 /// Appends shapes to a mesh; lengths in metres, positions in the world frame.
 class MeshBuilder {
  public:
+  void Facet(const Eigen::Vector3f& a,
+             const Eigen::Vector3f& b,
+             const Eigen::Vector3f& c,
+             float reflectivity);
+
   /// Corners in order round the edge.
   void Quad(const Eigen::Vector3f& a,
             const Eigen::Vector3f& b,

@@ -8,6 +8,8 @@
 
 #include "covsplat/core/result.hpp"
 #include "covsplat/core/se3.hpp"
+#include "covsplat/core/trajectory.hpp"
+#include "covsplat/sim/path.hpp"
 
 namespace covsplat {
 
@@ -26,13 +28,22 @@ class Motion {
   std::function<SE3(double)> pose_at_;
 };
 
-/// Names of the ways to move.
-std::span<const std::string_view> MotionNames();
+/// A way to move along a route.
+struct MotionKind {
+  std::string_view name;
+  std::string_view description;
+  Motion (*make)(const Route& route, int laps, int seed);
+};
 
-/// "handheld": a person walks once round the world, at 1.2 to 1.4 m/s where the way is straight,
-/// the sensor 1.5 m above the ground, with the bounce and sway of a gait and looks to either side.
-/// The walk starts and ends standing still at the same pose. The path is a cubic B-spline in time,
-/// so velocity and acceleration are continuous.
-Result<Motion> MakeMotion(std::string_view world, std::string_view name, int seed);
+std::span<const MotionKind> MotionKinds();
+
+/// Starts and ends standing still; after whole laps of a closed route at the same pose. Positions
+/// are twice continuously differentiable. Laps of an open route, and routes too short to move
+/// along, are errors.
+Result<Motion> MakeMotion(std::string_view name, const Route& route, int laps, int seed);
+
+/// The motion of a recorded trajectory, smoothed by a cubic B-spline of its poses; starts at time 0
+/// with its first pose. Needs two poses or more.
+Motion MotionAlong(const Trajectory& trajectory);
 
 }  // namespace covsplat

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "covsplat/core/check.hpp"
@@ -9,34 +10,82 @@
 
 namespace covsplat {
 
-Result<Simulation> Simulation::Create(const SimulationConfig& config) {
-  if (config.lidar.columns <= 0 || config.lidar.columns % 4 != 0) {
-    return Fail(ErrorCode::kUsage,
-                "lidar.columns is {}; choose a positive multiple of 4",
-                config.lidar.columns);
+namespace {
+
+// What there is to look at, and the way through it, if it has one of its own.
+struct Place {
+  WorldMesh mesh;
+  std::vector<Mover> movers;
+  std::optional<Route> route;
+  std::string_view default_motion = "walking";
+};
+
+Result<Place> FindPlace(const SimulationConfig& config) {
+  if (IsMeshFile(config.world)) {
+    Result<WorldMesh> mesh = LoadUserMesh(config.world, config.mesh);
+    if (!mesh) return Forward(mesh);
+    return Place{std::move(*mesh), {}, {}};
   }
-  if (config.lidar.elevation_low_deg >= config.lidar.elevation_high_deg) {
-    return Fail(ErrorCode::kUsage,
-                "lidar.elevation_low_deg ({}) must be below lidar.elevation_high_deg ({})",
-                config.lidar.elevation_low_deg,
-                config.lidar.elevation_high_deg);
-  }
-  Result<WorldMesh> mesh = MakeWorld(config.world, config.seed);
-  if (!mesh) return Forward(mesh);
-  Result<Motion> motion = MakeMotion(config.world, config.motion, config.seed);
-  if (!motion) return Forward(motion);
-  return Simulation(config, Scene(std::move(*mesh)), std::move(*motion));
+  const Result<WorldKind> world = FindWorld(config.world);
+  if (!world) return Forward(world);
+  return Place{
+      world->mesh(config.seed), world->movers(config.seed), world->route(), world->default_motion};
 }
 
-Simulation::Simulation(SimulationConfig config, Scene scene, Motion motion)
-    : config_(std::move(config)), scene_(std::move(scene)), motion_(std::move(motion)) {
+Result<Motion> FindMotion(const SimulationConfig& config, const Place& place) {
+  if (!config.route.file.empty()) return LoadUserMotion(config.route);
+  std::optional<Route> route = place.route;
+  if (!config.route.points_m.empty()) {
+    Result<Route> own = UserRoute(config.route);
+    if (!own) return Forward(own);
+    route = std::move(*own);
+  }
+  if (!route) {
+    return Fail(ErrorCode::kUsage,
+                "{}: say which way the sensor moves in it: --path FILE with its poses, or "
+                "-s route.points_m=[x,y,z,...] with the corners of a way",
+                config.world);
+  }
+  const std::string_view name =
+      config.motion.empty() ? place.default_motion : std::string_view(config.motion);
+  return MakeMotion(name, *route, config.laps, config.seed);
+}
+
+}  // namespace
+
+Result<Simulation> Simulation::Create(const SimulationConfig& config) {
+  const Result<void> possible = CheckLidar(config.lidar);
+  if (!possible) return Forward(possible);
+  Result<Place> place = FindPlace(config);
+  if (!place) return Forward(place);
+  Result<Motion> motion = FindMotion(config, *place);
+  if (!motion) return Forward(motion);
+  std::vector<std::string> warnings;
+  if (!place->route) warnings = DoubtsAbout(config.world, place->mesh, *motion);
+  Simulation simulation(
+      config, Scene(std::move(place->mesh)), std::move(place->movers), std::move(*motion));
+  simulation.warnings_ = std::move(warnings);
+  if (simulation.ScanCount() > 0) return simulation;
+  return Fail(ErrorCode::kUsage,
+              "the motion takes {:.3f} s, which is less than one scan",
+              simulation.motion_.Duration());
+}
+
+Simulation::Simulation(SimulationConfig config,
+                       Scene scene,
+                       std::vector<Mover> movers,
+                       Motion motion)
+    : config_(std::move(config)),
+      scene_(std::move(scene)),
+      movers_(std::move(movers)),
+      motion_(std::move(motion)) {
   scan_count_ = static_cast<int>(motion_.Duration() * config_.lidar.scan_rate_hz);
   if (config_.max_scans > 0) scan_count_ = std::min(scan_count_, config_.max_scans);
 }
 
 Scan Simulation::MakeScan(int index, ThreadPool& pool) const {
   COVSPLAT_CHECK(index >= 0 && index < scan_count_);
-  return SimulateScan(scene_, motion_, config_.lidar, index, pool);
+  return SimulateScan({scene_, movers_}, motion_, config_.lidar, index, pool);
 }
 
 SE3 Simulation::PoseOf(int index) const { return motion_.PoseAt(StampOf(config_.lidar, index)); }

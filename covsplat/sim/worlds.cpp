@@ -2,20 +2,61 @@
 
 #include <array>
 
+#include "covsplat/sim/college.hpp"
 #include "covsplat/sim/courtyard.hpp"
+#include "covsplat/sim/multilevel.hpp"
+#include "covsplat/sim/street.hpp"
+#include "covsplat/sim/tunnel.hpp"
 
 namespace covsplat {
 namespace {
 
-constexpr std::array<std::string_view, 1> kNames = {"courtyard"};
+std::vector<Mover> NothingMoves(int) { return {}; }
+
+constexpr std::array kWorlds = {
+    WorldKind{"courtyard",
+              "a quad between four facades: arcade, windows, trees, lawn",
+              "handheld",
+              MakeCourtyard,
+              CourtyardRoute,
+              NothingMoves},
+    WorldKind{"college",
+              "two courts joined by a passage, rooms, a terrace with stairs; revisits",
+              "walking",
+              MakeCollege,
+              CollegeRoute,
+              NothingMoves},
+    WorldKind{"street",
+              "a loop of 620 m round city blocks: traffic, people, parked cars, trees",
+              "vehicle",
+              MakeStreet,
+              StreetRoute,
+              StreetTraffic},
+    WorldKind{"tunnel",
+              "220 m of smooth tunnel between two portals; degenerate along its axis",
+              "vehicle",
+              MakeTunnel,
+              TunnelRoute,
+              NothingMoves},
+    WorldKind{"multilevel",
+              "three floors that look alike, joined by stairs; bait for false loops",
+              "walking",
+              MakeMultilevel,
+              MultilevelRoute,
+              NothingMoves},
+};
 
 }  // namespace
 
-std::span<const std::string_view> WorldNames() { return kNames; }
+std::span<const WorldKind> Worlds() { return kWorlds; }
 
-Result<WorldMesh> MakeWorld(std::string_view name, int seed) {
-  if (name == "courtyard") return MakeCourtyard(seed);
-  return Fail(ErrorCode::kUsage, "unknown world '{}'; known: {}", name, fmt::join(kNames, ", "));
+Result<WorldKind> FindWorld(std::string_view name) {
+  std::vector<std::string_view> names;
+  for (const WorldKind& world : kWorlds) {
+    if (world.name == name) return world;
+    names.push_back(world.name);
+  }
+  return Fail(ErrorCode::kUsage, "unknown world '{}'; known: {}", name, fmt::join(names, ", "));
 }
 
 }  // namespace covsplat

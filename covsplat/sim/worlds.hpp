@@ -3,17 +3,29 @@
 
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "covsplat/core/result.hpp"
 #include "covsplat/sim/mesh_builder.hpp"
+#include "covsplat/sim/mover.hpp"
+#include "covsplat/sim/path.hpp"
 
 namespace covsplat {
 
-/// Names that MakeWorld and MakeMotion know.
-std::span<const std::string_view> WorldNames();
+/// One row of the table of worlds. The seed varies details (window depths, leaves, plants, houses),
+/// never the plan; the same seed gives the same triangles.
+struct WorldKind {
+  std::string_view name;
+  std::string_view description;
+  std::string_view default_motion;
+  WorldMesh (*mesh)(int seed);  ///< what stands still: metres, z up
+  Route (*route)();
+  std::vector<Mover> (*movers)(int seed);
+};
 
-/// The surfaces of a world, in metres, z up. The seed varies details (window depths, leaves,
-/// plants), never the plan; the same seed gives the same triangles.
-Result<WorldMesh> MakeWorld(std::string_view name, int seed);
+std::span<const WorldKind> Worlds();
+
+/// The error names the known ones.
+Result<WorldKind> FindWorld(std::string_view name);
 
 }  // namespace covsplat

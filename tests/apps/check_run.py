@@ -112,7 +112,7 @@ def a_good_run_writes_everything(bench):
     expect(bench.call("info", out / "map.ply", "--json"), 0, out='"gaussians"')
     expect(bench.call("info", out), 0, out="gaussians")
     expect(bench.call("eval", "traj", out / "trajectory_tum.txt",
-                      bench.good / "groundtruth_tum.txt"), 0, out=f"{SCANS} poses compared")
+                      bench.good / "gt_tum.txt"), 0, out=f"{SCANS} poses compared")
 
 
 @case
@@ -290,7 +290,7 @@ def killed_runs_lose_nothing_that_was_tracked(bench):
     assert len(rows) >= seen
     assert (out / "config.yaml").is_file()
     expect(bench.call("eval", "traj", out / "trajectory_tum.txt",
-                      bench.good / "groundtruth_tum.txt"), 0)
+                      bench.good / "gt_tum.txt"), 0)
 
 
 def long_recording(bench):
@@ -323,7 +323,7 @@ def realtime_runs_count_what_they_drop(bench):
 
 @case
 def given_poses_are_followed(bench):
-    truth = bench.good / "groundtruth_tum.txt"
+    truth = bench.good / "gt_tum.txt"
     expect(bench.run(bench.good, "followed", "--poses", truth), 0)
     error = metrics(bench.folder / "followed")["trajectory_error"]["ate_translation_m"]
     assert error["max"] < 1e-3, error
@@ -341,7 +341,7 @@ def info_tells_what_a_recording_is(bench):
     call = bench.call("info", bench.good, "--json")
     expect(call, 0)
     facts = json.loads(call.stdout)
-    assert facts["scans"] == SCANS and facts["ground_truth"].endswith("groundtruth_tum.txt")
+    assert facts["scans"] == SCANS and facts["ground_truth"].endswith("gt_tum.txt")
     assert "32 beams" in facts["sensor"], facts["sensor"]
     assert 0.05 < facts["point_time_span_s"] < 0.11
     bare = bench.copy("bare")
@@ -351,7 +351,7 @@ def info_tells_what_a_recording_is(bench):
 
 @case
 def eval_judges_trajectories(bench):
-    truth = bench.good / "groundtruth_tum.txt"
+    truth = bench.good / "gt_tum.txt"
     expect(bench.call("eval", "traj", truth, truth, "--json"), 0, out='"rmse": 0.0')
     expect(bench.call("eval", "traj", bench.good / "poses.txt", truth), 2, err="--times")
     expect(bench.call("eval", "traj", bench.good / "poses.txt", truth, "--times",

@@ -160,9 +160,9 @@ TEST(GroundTruth, TheDenseTruthComesFirst) {
   EXPECT_EQ(truth->path.filename(), "poses.txt");
   EXPECT_EQ(truth->trajectory[1].stamp_s, 6.0);
   EXPECT_EQ(truth->trajectory[1].T_world_sensor.Translation().x(), 2.0);
-  folder.Put("groundtruth_tum.txt", "1 7 0 0 0 0 0 1\n");
+  folder.Put("gt_tum.txt", "1 7 0 0 0 0 0 1\n");
   truth = FindGroundTruth(folder.Path()).value();
-  EXPECT_EQ(truth->path.filename(), "groundtruth_tum.txt");
+  EXPECT_EQ(truth->path.filename(), "gt_tum.txt");
   EXPECT_EQ(truth->trajectory[0].T_world_sensor.Translation().x(), 7.0);
 }
 

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "covsplat/core/rng.hpp"
-#include "covsplat/sim/worlds.hpp"
 
 namespace covsplat {
 namespace {
@@ -106,6 +105,14 @@ TEST(MeshBuilder, RoundShapesHaveTheirRadii) {
   EXPECT_NEAR(cone.Cast({0.1f, 0.1f, 9.0f}, -Vector3f::UnitZ(), 20.0f)->range_m, 5.0f, kFloatRange);
 }
 
+TEST(MeshBuilder, AnOpeningWithoutDepthIsNothingButAHole) {
+  const Panel panel{Vector3f::Zero(), Vector3f::UnitX(), -Vector3f::UnitY()};
+  MeshBuilder mesh;
+  mesh.Wall(panel, 3.0f, 0.0f, 3.0f, {{1.0f, 2.0f, 1.0f, 2.0f, 0.0f, true, 0.1f}}, 0.8f);
+  const WorldMesh wall = std::move(mesh).Take();
+  EXPECT_EQ(wall.triangles.size(), 2u * 8u);  // nine cells but one
+}
+
 TEST(MeshBuilder, WallsHaveHolesWhereTheirOpeningsAre) {
   const Panel panel{Vector3f::Zero(), Vector3f::UnitX(), -Vector3f::UnitY()};
   MeshBuilder mesh;
@@ -121,23 +128,6 @@ TEST(MeshBuilder, WallsHaveHolesWhereTheirOpeningsAre) {
   EXPECT_NEAR(range_at(1.5f, 1.4f), 5.2f, kFloatRange);
   EXPECT_NEAR(range_at(5.5f, 2.5f), 5.0f, kFloatRange);
   EXPECT_EQ(range_at(3.5f, 1.0f), -1.0f);
-}
-
-TEST(Worlds, AreMadeFromTheirSeedAndNothingElse) {
-  for (const std::string_view name : WorldNames()) {
-    const WorldMesh first = MakeWorld(name, 3).value();
-    const WorldMesh again = MakeWorld(name, 3).value();
-    const WorldMesh other = MakeWorld(name, 4).value();
-    EXPECT_EQ(first.vertices, again.vertices);
-    EXPECT_EQ(first.triangles, again.triangles);
-    EXPECT_NE(first.vertices, other.vertices);
-  }
-}
-
-TEST(Worlds, AnUnknownNameIsAnErrorThatNamesTheKnownOnes) {
-  const auto world = MakeWorld("atlantis", 1);
-  ASSERT_FALSE(world);
-  EXPECT_NE(world.error().message.find("courtyard"), std::string::npos);
 }
 
 }  // namespace

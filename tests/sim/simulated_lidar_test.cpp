@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "covsplat/core/range_image.hpp"
-#include "covsplat/sim/worlds.hpp"
+#include "covsplat/sim/courtyard.hpp"
 
 namespace covsplat {
 namespace {
@@ -19,6 +19,7 @@ SimulatedLidarConfig Noiseless() {
   config.range_noise_m = 0.0;
   config.dropout_probability = 0.0;
   config.grazing_deg = 0.0;
+  config.mixed_pixel_probability = 0.0;
   return config;
 }
 
@@ -45,7 +46,7 @@ Motion Tumbling() {
 TEST(SimulateScan, EveryBeamFillsItsOwnPixel) {
   const SimulatedLidarConfig config = Noiseless();
   ThreadPool pool(2);
-  const Scan scan = SimulateScan(Room(), Standing(), config, 0, pool);
+  const Scan scan = SimulateScan({Room(), {}}, Standing(), config, 0, pool);
   const SensorModel sensor = ModelOf(config);
   ASSERT_EQ(scan.points.size(), static_cast<std::size_t>(config.rows * config.columns));
   const RangeImage image = ProjectScan(sensor, scan.points);
@@ -60,7 +61,7 @@ TEST(SimulateScan, EveryBeamFillsItsOwnPixel) {
 TEST(SimulateScan, TimesRunFromTheRearClockwiseRoundTheStamp) {
   const SimulatedLidarConfig config = Noiseless();
   ThreadPool pool(1);
-  const Scan scan = SimulateScan(Room(), Standing(), config, 7, pool);
+  const Scan scan = SimulateScan({Room(), {}}, Standing(), config, 7, pool);
   EXPECT_NEAR(scan.stamp_s, 0.75, 1e-12);
   ASSERT_EQ(scan.time_offset_s.size(), scan.points.size());
   const double half_column_s = 0.5 / (config.scan_rate_hz * config.columns);
@@ -77,13 +78,13 @@ TEST(SimulateScan, DeskewingWithTheTrueMotionPutsPointsBackOnTheSurfaces) {
   constexpr float kOnSurfaceM = 1e-4f;
   const SimulatedLidarConfig config = Noiseless();
   ThreadPool pool(2);
-  const Scene courtyard(MakeWorld("courtyard", 1).value());
-  const Motion walk = MakeMotion("courtyard", "handheld", 1).value();
+  const Scene courtyard(MakeCourtyard(1));
+  const Motion walk = MakeMotion("handheld", CourtyardRoute(), 1, 1).value();
   const Scene room = Room();
   const Motion tumbling = Tumbling();
   const std::pair<const Scene*, const Motion*> cases[] = {{&courtyard, &walk}, {&room, &tumbling}};
   for (const auto& [scene, motion] : cases) {
-    const Scan raw = SimulateScan(*scene, *motion, config, 20, pool);
+    const Scan raw = SimulateScan({*scene, {}}, *motion, config, 20, pool);
     const Scan deskewed = Deskewed(raw, *motion);
     const SE3 T_world_middle = motion->PoseAt(raw.stamp_s);
     float largest_skew_m = 0.0f;
@@ -100,25 +101,25 @@ TEST(SimulateScan, DeskewingWithTheTrueMotionPutsPointsBackOnTheSurfaces) {
 TEST(SimulateScan, IsTheSameForAnyNumberOfThreads) {
   SimulatedLidarConfig config;
   config.rows = 16;
-  const Scene scene(MakeWorld("courtyard", 1).value());
-  const Motion motion = MakeMotion("courtyard", "handheld", 1).value();
+  const Scene scene(MakeCourtyard(1));
+  const Motion motion = MakeMotion("handheld", CourtyardRoute(), 1, 1).value();
   ThreadPool one(1);
   ThreadPool two(2);
-  const Scan first = SimulateScan(scene, motion, config, 100, one);
-  const Scan second = SimulateScan(scene, motion, config, 100, two);
+  const Scan first = SimulateScan({scene, {}}, motion, config, 100, one);
+  const Scan second = SimulateScan({scene, {}}, motion, config, 100, two);
   EXPECT_EQ(first.points, second.points);
   EXPECT_EQ(first.intensity, second.intensity);
   EXPECT_EQ(first.time_offset_s, second.time_offset_s);
   config.seed = 2;
-  EXPECT_NE(SimulateScan(scene, motion, config, 100, two).points, first.points);
+  EXPECT_NE(SimulateScan({scene, {}}, motion, config, 100, two).points, first.points);
 }
 
 TEST(SimulateScan, RangeNoiseHasItsDeviationAndNoBias) {
   SimulatedLidarConfig config = Noiseless();
   ThreadPool pool(2);
-  const Scan exact = SimulateScan(Room(), Standing(), config, 0, pool);
+  const Scan exact = SimulateScan({Room(), {}}, Standing(), config, 0, pool);
   config.range_noise_m = 0.02;
-  const Scan noisy = SimulateScan(Room(), Standing(), config, 0, pool);
+  const Scan noisy = SimulateScan({Room(), {}}, Standing(), config, 0, pool);
   ASSERT_EQ(noisy.points.size(), exact.points.size());
   double sum = 0.0;
   double sum2 = 0.0;
@@ -140,13 +141,14 @@ TEST(SimulateScan, ReturnsAreLostAtRandomOutOfReachAndAtGrazingIncidence) {
   const auto n = static_cast<double>(config.rows * config.columns);
   config.dropout_probability = 0.2;
   const auto kept =
-      static_cast<double>(SimulateScan(room, Standing(), config, 0, pool).points.size());
+      static_cast<double>(SimulateScan({room, {}}, Standing(), config, 0, pool).points.size());
   EXPECT_NEAR(kept / n, 0.8, 4.0 * std::sqrt(0.16 / n));
 
   config = Noiseless();
   config.min_range_m = 3.0;
   config.max_range_m = 4.0;
-  for (const Eigen::Vector3f& point : SimulateScan(room, Standing(), config, 0, pool).points) {
+  for (const Eigen::Vector3f& point :
+       SimulateScan({room, {}}, Standing(), config, 0, pool).points) {
     EXPECT_GT(point.norm(), 3.0f);
     EXPECT_LT(point.norm(), 4.0f);
   }
@@ -156,7 +158,7 @@ TEST(SimulateScan, ReturnsAreLostAtRandomOutOfReachAndAtGrazingIncidence) {
   const Scene floor(std::move(mesh).Take());
   config = Noiseless();
   config.grazing_deg = 5.0;
-  const Scan scan = SimulateScan(floor, Standing(), config, 0, pool);
+  const Scan scan = SimulateScan({floor, {}}, Standing(), config, 0, pool);
   EXPECT_FALSE(scan.points.empty());
   for (const Eigen::Vector3f& point : scan.points) {
     EXPECT_LT(point.norm(), 1.0 / std::sin(5.0 * std::numbers::pi / 180.0));
@@ -165,7 +167,7 @@ TEST(SimulateScan, ReturnsAreLostAtRandomOutOfReachAndAtGrazingIncidence) {
 
 TEST(SimulateScan, IntensityStaysWithinItsBounds) {
   ThreadPool pool(1);
-  for (const float intensity : SimulateScan(Room(), Standing(), {}, 0, pool).intensity) {
+  for (const float intensity : SimulateScan({Room(), {}}, Standing(), {}, 0, pool).intensity) {
     EXPECT_GE(intensity, 0.0f);
     EXPECT_LE(intensity, 1.0f);
   }
