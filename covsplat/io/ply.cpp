@@ -1,5 +1,7 @@
 #include "covsplat/io/ply.hpp"
 
+#include <array>
+
 #include "covsplat/core/check.hpp"
 #include "covsplat/io/output_file.hpp"
 #include "covsplat/io/ply_body.hpp"
@@ -134,24 +136,14 @@ Result<void> WritePlyMesh(const std::filesystem::path& path,
 }
 
 Result<void> WriteTriangleMesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
-  std::string bytes = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\n"
-      "property float y\nproperty float z\nelement face {}\n"
-      "property list uchar int vertex_indices\nend_header\n",
-      mesh.vertices.size(),
-      mesh.triangles.size());
-  constexpr std::size_t kVertexBytes = 3 * sizeof(float);
-  constexpr std::size_t kFaceBytes = 1 + 3 * sizeof(int);
-  bytes.reserve(bytes.size() + kVertexBytes * mesh.vertices.size() +
-                kFaceBytes * mesh.triangles.size());
-  for (const Eigen::Vector3f& vertex : mesh.vertices) {
-    bytes.append(reinterpret_cast<const char*>(vertex.data()), kVertexBytes);
+  PointTable vertices;
+  constexpr std::array kNames = {"x", "y", "z"};
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<float> values;
+    for (const Eigen::Vector3f& vertex : mesh.vertices) values.push_back(vertex[axis]);
+    vertices.columns.push_back({kNames[static_cast<std::size_t>(axis)], std::move(values)});
   }
-  for (const Eigen::Vector3i& triangle : mesh.triangles) {
-    bytes.push_back(3);
-    bytes.append(reinterpret_cast<const char*>(triangle.data()), kFaceBytes - 1);
-  }
-  return WriteFileAtomically(path, bytes);
+  return WritePlyMesh(path, vertices, mesh.triangles);
 }
 
 }  // namespace covsplat

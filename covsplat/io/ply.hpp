@@ -23,16 +23,16 @@ Result<TriangleMesh> ReadTriangleMesh(const std::filesystem::path& path);
 /// The same from bytes in memory; `file` is for messages.
 Result<TriangleMesh> ParseTriangleMesh(std::string_view bytes, const std::string& file);
 
-/// Writes a mesh: vertices as below, and faces.
-Result<void> WritePlyMesh(const std::filesystem::path& path,
-                          const PointTable& vertices,
-                          std::span<const Eigen::Vector3i> triangles);
-
 /// Writes the vertices as binary_little_endian, at once. Comments must be single lines; columns of
 /// 64-bit integers do not exist in PLY.
 Result<void> WritePly(const std::filesystem::path& path, const PointTable& vertices);
 
-/// Writes vertices (float x y z) and faces (int vertex_indices) as binary_little_endian, at once.
+/// The same with faces (int vertex_indices).
+Result<void> WritePlyMesh(const std::filesystem::path& path,
+                          const PointTable& vertices,
+                          std::span<const Eigen::Vector3i> triangles);
+
+/// A mesh with no more than positions.
 Result<void> WriteTriangleMesh(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 }  // namespace covsplat
