@@ -30,6 +30,28 @@ Result<std::optional<Trajectory>> LoadTruePoses(const MapEvaluationRequest& requ
   return std::optional((*truth)->trajectory);
 }
 
+/// The rigid transform that brings the matched poses together: their positions, and with them the
+/// points a lever away along each axis of the sensor, without which a short or straight path would
+/// leave the map free to tilt.
+SE3 AlignPoses(const Trajectory& estimate, const Trajectory& truth) {
+  constexpr double kLeverM = 1.0;
+  const double max_gap_s = TrajectoryErrorOptions().max_gap_s;
+  std::vector<SE3> source, target;
+  for (const TimedPose& pose : estimate) {
+    const auto true_pose = PoseAt(truth, pose.stamp_s, max_gap_s);
+    if (!true_pose || !pose.T_world_sensor.IsFinite()) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double lever_m : {-kLeverM, kLeverM}) {
+        const SE3 T_sensor_tip(Eigen::Quaterniond::Identity(),
+                               lever_m * Eigen::Vector3d::Unit(axis));
+        source.push_back(pose.T_world_sensor * T_sensor_tip);
+        target.push_back(*true_pose * T_sensor_tip);
+      }
+    }
+  }
+  return AlignRigid(source, target);
+}
+
 /// Moves the result's frame to that of the truth.
 Result<void> Align(const MapEvaluationRequest& request,
                    const std::optional<Trajectory>& truth,
@@ -50,7 +72,7 @@ Result<void> Align(const MapEvaluationRequest& request,
                 request.trajectory->string(),
                 request.recording->string());
   }
-  evaluation.T_truth_result = error.T_truth_estimate;
+  evaluation.T_truth_result = AlignPoses(*estimate, *truth);
   evaluation.alignment = error;
   return {};
 }
