@@ -30,6 +30,28 @@ Result<std::optional<Trajectory>> LoadTruePoses(const MapEvaluationRequest& requ
   return std::optional((*truth)->trajectory);
 }
 
+/// The rigid transform that brings the matched poses together: their positions, and with them the
+/// points a lever away along each axis of the sensor, without which a short or straight path would
+/// leave the map free to tilt.
+SE3 AlignPoses(const Trajectory& estimate, const Trajectory& truth) {
+  constexpr double kLeverM = 1.0;
+  const double max_gap_s = TrajectoryErrorOptions().max_gap_s;
+  std::vector<SE3> source, target;
+  for (const TimedPose& pose : estimate) {
+    const auto true_pose = PoseAt(truth, pose.stamp_s, max_gap_s);
+    if (!true_pose || !pose.T_world_sensor.IsFinite()) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double lever_m : {-kLeverM, kLeverM}) {
+        const SE3 T_sensor_tip(Eigen::Quaterniond::Identity(),
+                               lever_m * Eigen::Vector3d::Unit(axis));
+        source.push_back(pose.T_world_sensor * T_sensor_tip);
+        target.push_back(*true_pose * T_sensor_tip);
+      }
+    }
+  }
+  return AlignRigid(source, target);
+}
+
 /// Moves the result's frame to that of the truth.
 Result<void> Align(const MapEvaluationRequest& request,
                    const std::optional<Trajectory>& truth,
@@ -50,7 +72,7 @@ Result<void> Align(const MapEvaluationRequest& request,
                 request.trajectory->string(),
                 request.recording->string());
   }
-  evaluation.T_truth_result = error.T_truth_estimate;
+  evaluation.T_truth_result = AlignPoses(*estimate, *truth);
   evaluation.alignment = error;
   return {};
 }
@@ -103,10 +125,46 @@ void Warn(const Surface& result, const Surface& truth, const SE3& T_truth_result
   if (odd) ReportWarning(*odd);
 }
 
+/// All figures of two surfaces whose frames are known, and the heat map.
+Result<void> Measure(const MapEvaluationRequest& request,
+                     const Surface& result,
+                     const Surface& truth,
+                     const std::optional<Trajectory>& true_poses,
+                     MapEvaluation& evaluation) {
+  ThreadPool pool(request.threads);
+  SamplingOptions truth_sampling = request.sampling;
+  ++truth_sampling.seed;  // other samples than the result's, even of the same surface
+  const auto result_points = PointsOf(result, evaluation.T_truth_result, request.sampling, pool);
+  if (!result_points) return Forward(result_points);
+  const auto truth_points = PointsOf(truth, {}, truth_sampling, pool);
+  if (!truth_points) return Forward(truth_points);
+  evaluation.result = Judged(request.result, result, result_points->size());
+  evaluation.truth = Judged(request.truth, truth, truth_points->size());
+
+  const SurfaceDistances distances = MeasureDistances(*result_points, *truth_points, pool);
+  evaluation.paper = PaperError(distances, request.errors);
+  std::vector<std::uint8_t> visible;
+  if (true_poses) {
+    const auto space = Observe(request, *true_poses, evaluation);
+    if (!space) return Forward(space);
+    visible = space->Visible(*truth_points, pool);
+    evaluation.strict = StrictError(
+        distances, space->InObservedSpace(*result_points, pool), visible, request.errors);
+  }
+  if (!request.heatmap) return {};
+  auto written = WriteHeatmap(
+      {*request.heatmap, request.heat_limit_m},
+      {result, evaluation.T_truth_result, *result_points, *truth_points, std::move(visible)},
+      distances,
+      pool);
+  if (!written) return Forward(written);
+  evaluation.written = std::move(*written);
+  return {};
+}
+
 }  // namespace
 
 Result<MapEvaluation> EvaluateMap(const MapEvaluationRequest& request) {
-  MapEvaluation evaluation;
   if (request.heatmap) {
     const Result<void> writable = CheckHeatmapFolder(*request.heatmap);
     if (!writable) return Forward(writable);
@@ -117,38 +175,12 @@ Result<MapEvaluation> EvaluateMap(const MapEvaluationRequest& request) {
   if (!truth) return Forward(truth);
   const Result<std::optional<Trajectory>> true_poses = LoadTruePoses(request);
   if (!true_poses) return Forward(true_poses);
+  MapEvaluation evaluation;
   const Result<void> aligned = Align(request, *true_poses, evaluation);
   if (!aligned) return Forward(aligned);
   Warn(*result, *truth, evaluation.T_truth_result);
-
-  ThreadPool pool(request.threads);
-  SamplingOptions truth_sampling = request.sampling;
-  ++truth_sampling.seed;  // other samples than the result's, even of the same surface
-  const auto result_points = PointsOf(*result, evaluation.T_truth_result, request.sampling, pool);
-  if (!result_points) return Forward(result_points);
-  const auto truth_points = PointsOf(*truth, {}, truth_sampling, pool);
-  if (!truth_points) return Forward(truth_points);
-  evaluation.result = Judged(request.result, *result, result_points->size());
-  evaluation.truth = Judged(request.truth, *truth, truth_points->size());
-
-  const SurfaceDistances distances = MeasureDistances(*result_points, *truth_points, pool);
-  evaluation.paper = PaperError(distances, request.errors);
-  std::vector<std::uint8_t> visible;
-  if (*true_poses) {
-    const auto space = Observe(request, **true_poses, evaluation);
-    if (!space) return Forward(space);
-    visible = space->Visible(*truth_points, pool);
-    evaluation.strict = StrictError(
-        distances, space->InObservedSpace(*result_points, pool), visible, request.errors);
-  }
-  if (!request.heatmap) return evaluation;
-  auto written = WriteHeatmap(
-      {*request.heatmap, request.heat_limit_m},
-      {*result, evaluation.T_truth_result, *result_points, *truth_points, std::move(visible)},
-      distances,
-      pool);
-  if (!written) return Forward(written);
-  evaluation.written = std::move(*written);
+  const Result<void> measured = Measure(request, *result, *truth, *true_poses, evaluation);
+  if (!measured) return Forward(measured);
   return evaluation;
 }
 

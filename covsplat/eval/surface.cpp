@@ -12,7 +12,7 @@
 namespace covsplat {
 namespace {
 
-constexpr double kMaxSamples = 4e9;
+constexpr double kMaxSamples = 1e9;    // about 6 GB of points
 constexpr double kMaxCells = 1 << 20;  // that a grid reaches to either side
 constexpr double kOddRatio = 100.0;
 constexpr double kApart = 0.1;  // of the size of the truth

@@ -24,7 +24,10 @@ struct Piece {
 struct Visit {
   std::uint64_t tile = 0;
   std::size_t piece = 0;
-  auto operator<=>(const Visit&) const = default;
+
+  bool operator<(const Visit& other) const {
+    return std::tie(tile, piece) < std::tie(other.tile, other.piece);
+  }
 };
 
 double AreaOf(const Piece& piece) {

@@ -119,12 +119,14 @@ def write_recording(folder):
 
 
 def write_run(folder):
-    """A run on that recording: the true trajectory in the frame of its first scan."""
+    """A run on that recording: the true trajectory in the frame of its first scan, straight but for
+    millimetres, which must not tilt the map."""
     folder.mkdir()
     lines = []
     for k in range(8):
         yaw, x = 0.3 * k, 0.4 * k
-        lines.append(f"{0.1 * k:.3f} {x} 0 0 0 0 {math.sin(yaw / 2)} {math.cos(yaw / 2)}")
+        y, z = 0.001 * (-1) ** k, 0.001 * (-1) ** (k // 2)
+        lines.append(f"{0.1 * k:.3f} {x} {y} {z} 0 0 {math.sin(yaw / 2)} {math.cos(yaw / 2)}")
     (folder / "trajectory_tum.txt").write_text("\n".join(lines) + "\n")
     return folder
 
@@ -186,11 +188,12 @@ def the_map_of_a_run_is_moved_to_the_truth(bench):
     mapped = write_room(bench.folder / "mapped.ply", shift=(1.4, 0.0, 0.0))
     run = write_run(bench.folder / "run")
     found, _ = bench.map(mapped, truth, "--run", run, "--recording", recording)
-    near(found["T_truth_result"][0][3], -1.4, 1e-6)
+    near(found["T_truth_result"][0][3], -1.4, 2e-3)
+    near(found["T_truth_result"][2][1], 0.0, 2e-3)
     assert found["alignment"]["matched_poses"] == 8
     assert found["paper"]["scores"][0]["f_score_percent"] == 100.0
     same, _ = bench.map(mapped, truth, "--transform", "1 0 0 -1.4 0 1 0 0 0 0 1 0 0 0 0 1")
-    near(same["paper"]["chamfer_l1_cm"], found["paper"]["chamfer_l1_cm"], 0.01)
+    near(same["paper"]["chamfer_l1_cm"], found["paper"]["chamfer_l1_cm"], 0.2)
     off, _ = bench.map(mapped, truth)
     assert off["paper"]["chamfer_l1_cm"] > 1.5 * found["paper"]["chamfer_l1_cm"]
     expect(bench.call("map", mapped, truth, "--run", run), 2, err="--recording")
