@@ -27,6 +27,7 @@ struct SimulateOptions {
   bool overwrite = false;
   bool list = false;
   bool json = false;
+  bool settings = false;
   bool quiet = false;
   int scans = 0;
   int seed = -1;
@@ -76,6 +77,10 @@ void ApplyFlags(const SimulateOptions& options, SimulationConfig& config) {
 
 ExitCode RunSimulate(const SimulateOptions& options) {
   if (options.list) return List(options.json);
+  if (options.settings) {
+    fmt::print("{}", DescribeConfig(SimulationConfig()));
+    return kExitOk;
+  }
   if (options.world.empty() && options.config.files.empty()) {
     return ReportError({ErrorCode::kUsage, "name a world to simulate; --list shows what there is"});
   }
@@ -107,6 +112,7 @@ void AddSimulateCommand(CLI::App& app, int& exit_code) {
   simulate->add_flag("--overwrite", options->overwrite, "Replace an earlier simulated recording");
   simulate->add_flag("--list", options->list, "List the worlds, motions and sensors");
   simulate->add_flag("--json", options->json, "List as JSON");
+  simulate->add_flag("--settings", options->settings, "List what -c and -s can set, and exit");
   simulate->add_option("--sensor", options->sensor, "Sensor to simulate; default: os0-64")
       ->type_name("NAME");
   simulate->add_option("--motion", options->motion, "How it moves; default: as suits the world")
@@ -114,7 +120,7 @@ void AddSimulateCommand(CLI::App& app, int& exit_code) {
   simulate->add_option("--path", options->path, "Poses to move along, TUM or KITTI")
       ->type_name("FILE");
   simulate->add_option("--laps", options->laps, "Times round the world's way")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1, 100));
   simulate->add_option("-n,--n-scans", options->scans, "Stop after so many scans")
       ->check(CLI::PositiveNumber);
   simulate->add_option("--seed", options->seed, "Of the world's details and of the walk")

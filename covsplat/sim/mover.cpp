@@ -1,6 +1,5 @@
 #include "covsplat/sim/mover.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include <Eigen/Geometry>

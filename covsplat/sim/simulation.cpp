@@ -33,7 +33,12 @@ Result<Place> FindPlace(const SimulationConfig& config) {
 }
 
 Result<Motion> FindMotion(const SimulationConfig& config, const Place& place) {
-  if (!config.route.file.empty()) return LoadUserMotion(config.route);
+  if (!config.route.file.empty()) {
+    if (config.motion.empty() && config.laps == 1) return LoadUserMotion(config.route);
+    return Fail(ErrorCode::kUsage,
+                "{}: its poses are the motion; leave out --motion and --laps",
+                config.route.file);
+  }
   std::optional<Route> route = place.route;
   if (!config.route.points_m.empty()) {
     Result<Route> own = UserRoute(config.route);

@@ -52,10 +52,9 @@ void AddTube(MeshBuilder& mesh) {
     AddStrip(mesh, {wall, -0.1f}, {wall, kSpring}, kConcrete);
     AddStrip(mesh, {wall, kKerb}, {kerb, kKerb}, kStone);
     AddStrip(mesh, {kerb, kKerb}, {kerb, -0.1f}, kStone);
-    for (const float y : {wall - side * 0.25f, wall}) {  // a cable tray
-      AddStrip(mesh, {y, 2.3f}, {y, 2.42f}, 0.3f);
-    }
-    AddStrip(mesh, {wall - side * 0.25f, 2.3f}, {wall, 2.3f}, 0.3f);
+    const float tray = wall - side * 0.3f;  // for cables
+    AddStrip(mesh, {tray, 2.3f}, {tray, 2.42f}, 0.3f);
+    AddStrip(mesh, {tray, 2.3f}, {wall, 2.3f}, 0.3f);
   }
   AddStrip(mesh, {-0.2f, 6.3f}, {0.2f, 6.3f}, 0.8f);  // the lights
 }

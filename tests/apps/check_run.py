@@ -143,7 +143,30 @@ def wrong_requests_are_usage_errors(bench):
                      "sensor.elevation_deg=[0,10]"), 2, err="top beam first")
     expect(bench.call("simulate", "atlantis", "-o", "x"), 2, err="courtyard")
     expect(bench.call("simulate", "--list"), 0, out="courtyard")
+    expect(bench.call("simulate", "--list", "--json"), 0, out='"hdl-64e"')
+    expect(bench.call("simulate", "courtyard", "-o", "x", "--sensor", "os9"), 2, err="vlp-16")
+    expect(bench.call("simulate", "courtyard", "-o", "x", "--motion", "fly"), 2, err="walking")
+    expect(bench.call("simulate", "tunnel", "-o", "x", "--laps", "2"), 2, err="choose 1")
+    expect(bench.call("simulate", "no_mesh.obj", "-o", "x"), 3, err="no_mesh.obj")
     assert not (bench.folder / "x").exists()
+
+
+@case
+def simulated_recordings_have_their_truth_beside_them(bench):
+    out = bench.folder / "livox"
+    expect(bench.call("simulate", "street", "-o", out, "-n", 2, "--sensor", "livox-mid70",
+                      "-s", "lidar.rosette.points_per_s=2000"), 0, out="rosette")
+    for name in ("gt_tum.txt", "gt_mesh.ply", "sensor.yaml"):
+        assert (out / name).stat().st_size > 0, name
+    for scan in ("000000", "000001"):
+        labels = (out / f"labels/{scan}.label").stat().st_size // 4
+        assert labels == (out / f"velodyne/{scan}.bin").stat().st_size // 16 > 100, scan
+    preview = bench.folder / "street.png"
+    expect(bench.call("simulate", "street", "--preview", preview), 0)
+    assert preview.read_bytes()[:4] == b"\x89PNG"
+    # A run takes the sensor file as it is.
+    expect(bench.run(bench.good, "own_sensor", "-c", bench.good / "sensor.yaml"), 0,
+           out="as configured")
 
 
 @case

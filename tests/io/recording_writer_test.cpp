@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "covsplat/io/ground_truth.hpp"
+#include "covsplat/io/ply.hpp"
 #include "covsplat/io/scan_source.hpp"
 
 namespace covsplat {
@@ -59,6 +60,41 @@ TEST(RecordingWriter, WhatIsWrittenIsReadBack) {
   const auto truth = FindGroundTruth(path);
   ASSERT_TRUE(truth && truth->has_value());
   EXPECT_EQ((*truth)->trajectory.back().stamp_s, 9.0);
+}
+
+TEST(RecordingWriter, LabelsAreWrittenAsSemanticKittiHasThem) {
+  const TemporaryFolder folder;
+  Scan empty = MakeScan(0.0, 0);
+  Scan scan = MakeScan(0.1, 3);
+  scan.label = {0, 252, 254};
+  WriteRecording(folder.Path(), {empty, scan});
+  EXPECT_EQ(folder.Get("labels/000000.label"), "");
+  EXPECT_EQ(folder.Get("labels/000001.label"), std::string("\0\0\0\0\xfc\0\0\0\xfe\0\0\0", 12));
+  EXPECT_EQ(ReadAll(folder.Path()).size(), 2u) << "labels are no scans";
+}
+
+TEST(RecordingWriter, MeshAndSensorLieBesideTheScansAndGoWithThem) {
+  const TemporaryFolder folder;
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0.5f}};
+  mesh.triangles = {{0, 1, 2}};
+  {
+    auto writer = RecordingWriter::Create(folder.Path(), false);
+    ASSERT_TRUE(writer);
+    ASSERT_TRUE(writer->WriteMesh(mesh));
+    ASSERT_TRUE(writer->WriteSensor("sensor:\n  columns: 64\n"));
+    ASSERT_TRUE(writer->Write(MakeScan(0.0, 4), PoseAtX(0.0)));
+    ASSERT_TRUE(writer->Finish({{0.0, PoseAtX(0.0)}}));
+  }
+  const auto read = ReadTriangleMesh(folder.Path() / "gt_mesh.ply");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->vertices, mesh.vertices);
+  EXPECT_EQ(read->triangles, mesh.triangles);
+  EXPECT_EQ(folder.Get("sensor.yaml"), "sensor:\n  columns: 64\n");
+  EXPECT_EQ(ReadAll(folder.Path()).size(), 1u) << "the mesh is no scan";
+  WriteRecording(folder.Path(), {MakeScan(0.0, 2)});
+  EXPECT_FALSE(std::filesystem::exists(folder.Path() / "gt_mesh.ply"));
+  EXPECT_FALSE(std::filesystem::exists(folder.Path() / "sensor.yaml"));
 }
 
 TEST(RecordingWriter, ScansWithoutTimesOfPointsHaveNone) {

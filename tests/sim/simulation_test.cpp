@@ -190,6 +190,9 @@ TEST_F(UserMesh, NonsenseIsAnErrorThatSaysWhatToDo) {
   config.route.points_m = {1.0, 2.0, 3.0, 4.0};
   EXPECT_NE(message(config).find("route.points_m"), std::string::npos);
   config.route.file = "/nowhere/poses.txt";
+  config.laps = 2;
+  EXPECT_NE(message(config).find("--laps"), std::string::npos);
+  config.laps = 1;
   EXPECT_NE(message(config).find("/nowhere/poses.txt"), std::string::npos);
   config.route.file = folder_.Put("one.txt", "0 0 0 0 0 0 0 1\n").string();
   EXPECT_NE(message(config).find("two or more"), std::string::npos);

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -16,10 +17,10 @@ namespace {
 constexpr int kSeed = 3;
 
 // Worlds are large: each is built once for all tests.
-const Scene& SceneOf(const WorldKind& world) {
-  static std::map<std::string_view, std::unique_ptr<const Scene>> scenes;
-  auto& scene = scenes[world.name];
-  if (!scene) scene = std::make_unique<const Scene>(world.mesh(kSeed));
+const Scene& SceneOf(const WorldKind& world, int seed = kSeed) {
+  static std::map<std::pair<std::string_view, int>, std::unique_ptr<const Scene>> scenes;
+  auto& scene = scenes[{world.name, seed}];
+  if (!scene) scene = std::make_unique<const Scene>(world.mesh(seed));
   return *scene;
 }
 
@@ -55,12 +56,12 @@ TEST_P(EveryWorld, IsFiniteAndOfSensibleSurfaces) {
   EXPECT_LT(slivers, mesh.triangles.size() / 100);
 }
 
-TEST_P(EveryWorld, ItsWayKeepsClearOfEverythingWithGroundBelow) {
-  const Scene& scene = SceneOf(GetParam());
-  const bool drives = GetParam().default_motion == "vehicle";
+void ExpectClearWay(const WorldKind& world, int seed) {
+  const Scene& scene = SceneOf(world, seed);
+  const bool drives = world.default_motion == "vehicle";
   const float clear_m = drives ? 1.0f : 0.3f;
-  const Motion motion = MakeMotion(GetParam().default_motion, GetParam().route(), 1, kSeed).value();
-  const float height_m = drives ? 1.8f : (GetParam().default_motion == "handheld" ? 1.5f : 1.7f);
+  const Motion motion = MakeMotion(world.default_motion, world.route(), 1, seed).value();
+  const float height_m = drives ? 1.8f : (world.default_motion == "handheld" ? 1.5f : 1.7f);
   for (double time_s = 0.0; time_s < motion.Duration(); time_s += 0.1) {
     const Eigen::Vector3f position = motion.PoseAt(time_s).Translation().cast<float>();
     ASSERT_FALSE(scene.DistanceTo(position, clear_m)) << time_s << " s: " << position.transpose();
@@ -72,10 +73,14 @@ TEST_P(EveryWorld, ItsWayKeepsClearOfEverythingWithGroundBelow) {
   }
 }
 
-TEST_P(EveryWorld, ItsMoversKeepClearOfWallsAndOfTheSensor) {
-  const Scene& scene = SceneOf(GetParam());
-  const Motion motion = MakeMotion(GetParam().default_motion, GetParam().route(), 1, kSeed).value();
-  for (const Mover& mover : GetParam().movers(kSeed)) {
+TEST_P(EveryWorld, ItsWayKeepsClearOfEverythingWithGroundBelow) {
+  for (const int seed : {1, kSeed}) ExpectClearWay(GetParam(), seed);
+}
+
+void ExpectClearMovers(const WorldKind& world, int seed) {
+  const Scene& scene = SceneOf(world, seed);
+  const Motion motion = MakeMotion(world.default_motion, world.route(), 1, seed).value();
+  for (const Mover& mover : world.movers(seed)) {
     for (double time_s = 0.0; time_s < motion.Duration(); time_s += 0.5) {
       const SE3 T_world_mover = mover.motion.PoseAt(time_s);
       const Eigen::Vector3d waist = T_world_mover * Eigen::Vector3d(0.0, 0.0, 1.0);
@@ -84,6 +89,10 @@ TEST_P(EveryWorld, ItsMoversKeepClearOfWallsAndOfTheSensor) {
       ASSERT_GT(apart_m, 2.0) << time_s;
     }
   }
+}
+
+TEST_P(EveryWorld, ItsMoversKeepClearOfWallsAndOfTheSensor) {
+  for (const int seed : {1, kSeed}) ExpectClearMovers(GetParam(), seed);
 }
 
 TEST(Worlds, RoutesHaveTheLengthsThatTheyPromise) {
