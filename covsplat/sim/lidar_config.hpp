@@ -29,8 +29,8 @@ struct SimulatedLidarConfig {
   int columns = 1024;
   double elevation_low_deg = -45.0;
   double elevation_high_deg = 45.0;
-  std::vector<double> elevation_deg;
-  RosettePattern rosette;
+  std::vector<double> elevation_deg = {};
+  RosettePattern rosette = {};
   double min_range_m = 0.5;
   double max_range_m = 100.0;
   double scan_rate_hz = 10.0;
