@@ -28,7 +28,9 @@ void FillFrom(const SensorModel& model, SlamConfig& config) {
   }
 }
 
-Result<SensorModel> ModelOf(const SlamConfig& config) {
+}  // namespace
+
+Result<SensorModel> SensorOf(const SlamConfig& config) {
   const SensorConfig& sensor = config.sensor;
   const std::vector<double>& table = sensor.elevation_deg;
   if (table.size() < 2 ||
@@ -53,8 +55,6 @@ Result<SensorModel> ModelOf(const SlamConfig& config) {
   for (const double e : table) elevation_rad.push_back(e * kDegree);
   return SensorModel(std::move(elevation_rad), sensor.columns, low, high);
 }
-
-}  // namespace
 
 Result<std::vector<Scan>> FirstScans(const std::filesystem::path& recording,
                                      SourceOptions source,
@@ -86,7 +86,7 @@ Result<SensorChoice> ChooseSensor(const std::filesystem::path& recording,
     FillFrom(estimate.model, config);
     verdict = std::move(estimate.verdict);
   }
-  Result<SensorModel> model = ModelOf(config);
+  Result<SensorModel> model = SensorOf(config);
   if (!model) return Forward(model);
   return SensorChoice{std::move(*model), std::move(verdict)};
 }
