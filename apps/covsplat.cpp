@@ -26,6 +26,8 @@ int Run(int argc, char** argv) {
   AddInfoCommand(app, exit_code);
   AddEvalCommand(app, exit_code);
   AddMeshCommand(app, exit_code);
+  AddRenderCommand(app, exit_code);
+  AddExportCommand(app, exit_code);
   AddConfigCommand(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -26,6 +26,12 @@ void AddEvalCommand(CLI::App& app, int& exit_code);
 /// mesh <run folder>
 void AddMeshCommand(CLI::App& app, int& exit_code);
 
+/// render <run folder>
+void AddRenderCommand(CLI::App& app, int& exit_code);
+
+/// export <run folder>
+void AddExportCommand(CLI::App& app, int& exit_code);
+
 /// config dump | check | describe
 void AddConfigCommand(CLI::App& app, int& exit_code);
 

@@ -1,3 +1,4 @@
+#include <chrono>
 #include <filesystem>
 #include <memory>
 
@@ -64,8 +65,13 @@ ExitCode RunMesh(const MeshOptions& options) {
   Progress::Options progress_options;
   progress_options.quiet = options.quiet;
   Progress progress(progress_options);
+  auto last = std::chrono::steady_clock::now();
   const auto on_progress = [&](const MeshProgress& now) {
+    const auto time = std::chrono::steady_clock::now();
     ProgressStatus status;
+    status.unit = "view";
+    status.ms_per_scan = std::chrono::duration<double, std::milli>(time - last).count();
+    last = time;
     status.done = static_cast<std::int64_t>(now.done);
     status.total = static_cast<std::int64_t>(now.total);
     status.gaussians = -1;
