@@ -6,6 +6,9 @@
 namespace covsplat {
 namespace {
 
+/// Of the truncation; at 3 voxels a wall of 2 does not thicken.
+constexpr float kBehindShare = 2.0f / 3.0f;
+
 /// What a view has to say to every voxel of the field.
 struct FusionJob {
   const ViewCamera* camera;
@@ -14,14 +17,15 @@ struct FusionJob {
   Eigen::Matrix3f R_map_view;
   float voxel_m;
   float truncation_m;
+  float behind_m;  ///< depth behind a surface that still counts
   float max_range_m;
 };
 
-/// Sees a surface from behind less and less, down to nothing at the truncation: the far side of a
-/// thin wall is for views of that side.
+/// Falls behind the surface from one voxel deep down to nothing at the depth that still counts: the
+/// far side of a thin wall is for views of that side.
 float WeightBehind(float distance_m, const FusionJob& job) {
   if (distance_m > -job.voxel_m) return 1.0f;
-  return std::max(0.0f, (job.truncation_m + distance_m) / (job.truncation_m - job.voxel_m));
+  return std::max(0.0f, (job.behind_m + distance_m) / (job.behind_m - job.voxel_m));
 }
 
 void FuseVoxel(const FusionJob& job, const Eigen::Vector3f& p_view, Voxel& voxel) {
@@ -38,7 +42,7 @@ void FuseVoxel(const FusionJob& job, const Eigen::Vector3f& p_view, Voxel& voxel
   float distance = job.truncation_m;
   if (in_front < reach) {
     distance = pixel.normal.dot(p_view - pixel.range_m * job.rays->Pixels()[i]);
-    if (distance <= -job.truncation_m) return;
+    if (distance <= -job.behind_m) return;
     distance = std::min(distance, job.truncation_m);
   }
   const float weight = pixel.weight * WeightBehind(distance, job);
@@ -93,6 +97,7 @@ void FuseView(const ViewCamera& camera,
   job.R_map_view = view.T_map_view.RotationMatrix().cast<float>();
   job.voxel_m = static_cast<float>(grid.VoxelSize());
   job.truncation_m = static_cast<float>(config.truncation_voxels * grid.VoxelSize());
+  job.behind_m = kBehindShare * job.truncation_m;
   job.max_range_m = static_cast<float>(config.view.max_range_m);
   ParallelFor(pool, grid.Size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) FuseBlock(job, grid.Block(i), grid.Voxels(i));

@@ -48,7 +48,7 @@ struct ViewConfig {
 struct MeshConfig {
   double voxel_m = 0.0;
   double truncation_voxels = 3.0;
-  double min_weight = 0.5;
+  double min_weight = 0.1;
   double sharpness = 0.9;
   double min_component_m2 = 0.1;
   int max_tile_blocks = 40000;
@@ -63,7 +63,7 @@ struct MeshConfig {
             "edge of a voxel; 0: chosen from the spacing of the map's Gaussians");
     v.Field("truncation_voxels",
             c.truncation_voxels,
-            Range{1.5, 20.0},
+            Range{2.0, 20.0},
             "distances are kept up to so many voxels from a surface");
     v.Field("min_weight",
             c.min_weight,
