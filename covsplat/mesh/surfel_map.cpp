@@ -89,7 +89,7 @@ double VoxelFor(const SurfelMap& map) {
   }
   const auto middle = extent.begin() + static_cast<std::ptrdiff_t>(extent.size() / 2);
   std::nth_element(extent.begin(), middle, extent.end());
-  const double voxel = std::clamp(static_cast<double>(*middle) / 3.0, 0.02, 0.5);
+  const double voxel = std::clamp(0.5 * static_cast<double>(*middle), 0.02, 0.5);
   const double digit = std::pow(10.0, std::floor(std::log10(voxel)) - 1.0);
   return std::round(voxel / digit) * digit;
 }

@@ -29,7 +29,7 @@ Result<std::unique_ptr<SplatEngine>> MakeMapEngine(const SurfelMap& map,
                                                    const EngineConfig& config,
                                                    ThreadPool& pool);
 
-/// A voxel that resolves what the map resolves: a third of the Gaussians' median extent (a standard
+/// A voxel that resolves what the map resolves: half the Gaussians' median extent (a standard
 /// deviation), to two digits, within [0.02, 0.5] m. The map must not be empty.
 double VoxelFor(const SurfelMap& map);
 
