@@ -25,6 +25,9 @@ int Run(int argc, char** argv) {
   AddSimulateCommand(app, exit_code);
   AddInfoCommand(app, exit_code);
   AddEvalCommand(app, exit_code);
+  AddMeshCommand(app, exit_code);
+  AddRenderCommand(app, exit_code);
+  AddExportCommand(app, exit_code);
   AddConfigCommand(app, exit_code);
   try {
     app.parse(argc, argv);

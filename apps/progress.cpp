@@ -33,7 +33,7 @@ double ShareDone(const ProgressStatus& status) {
 /// "12.7 scan/s  78.7 ms  184 213 Gaussians  412 MB  ETA 0:21"
 std::string Numbers(const ProgressStatus& status, double elapsed_s) {
   const double rate = elapsed_s > 0.0 ? static_cast<double>(status.done) / elapsed_s : 0.0;
-  std::string text = fmt::format("{:.1f} scan/s  {:.1f} ms", rate, status.ms_per_scan);
+  std::string text = fmt::format("{:.1f} {}/s  {:.1f} ms", rate, status.unit, status.ms_per_scan);
   if (status.gaussians >= 0) {
     text += fmt::format("  {} Gaussians", FormatCount(static_cast<double>(status.gaussians)));
   }
@@ -72,7 +72,7 @@ std::string ProgressBar(const ProgressStatus& status, double elapsed_s, int colu
 }
 
 std::string ProgressLine(const ProgressStatus& status, double elapsed_s) {
-  return fmt::format("scan {}  {}", Counter(status), Numbers(status, elapsed_s));
+  return fmt::format("{} {}  {}", status.unit, Counter(status), Numbers(status, elapsed_s));
 }
 
 Progress::Progress() : Progress(Options()) {}

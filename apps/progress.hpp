@@ -16,6 +16,7 @@ struct ProgressStatus {
   std::int64_t gaussians = 0;  ///< negative: there is no map
   std::int64_t rss_bytes = 0;
   std::int64_t lost = 0;
+  const char* unit = "scan";  ///< what is counted
 };
 
 /// One line of at most `columns` letters with a bar. Below about 40 columns the bar goes first,

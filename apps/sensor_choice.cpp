@@ -30,7 +30,9 @@ void FillFrom(const SensorModel& model, SlamConfig& config) {
   if (sensor.columns == 0) sensor.columns = model.Columns();
 }
 
-Result<SensorModel> ModelOf(const SlamConfig& config) {
+}  // namespace
+
+Result<SensorModel> SensorOf(const SlamConfig& config) {
   const SensorConfig& sensor = config.sensor;
   const std::vector<double>& table = sensor.elevation_deg;
   if (table.size() < 2 ||
@@ -54,8 +56,6 @@ Result<SensorModel> ModelOf(const SlamConfig& config) {
   return SensorModel(
       std::move(elevation_rad), sensor.columns, sensor.min_range_m, sensor.max_range_m);
 }
-
-}  // namespace
 
 Result<std::vector<Scan>> FirstScans(const std::filesystem::path& recording,
                                      SourceOptions source,
@@ -88,7 +88,7 @@ Result<SensorChoice> ChooseSensor(const std::filesystem::path& recording,
     verdict = std::move(estimate.verdict);
   }
   FillRanges(config);
-  Result<SensorModel> model = ModelOf(config);
+  Result<SensorModel> model = SensorOf(config);
   if (!model) return Forward(model);
   return SensorChoice{std::move(*model), std::move(verdict)};
 }

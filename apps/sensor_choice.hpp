@@ -22,6 +22,9 @@ Result<SensorChoice> ChooseSensor(const std::filesystem::path& recording,
                                   SourceOptions source,
                                   SlamConfig& config);
 
+/// The model of a filled configuration, such as a run leaves in its folder.
+Result<SensorModel> SensorOf(const SlamConfig& config);
+
 /// The first scans that can be read and have points.
 Result<std::vector<Scan>> FirstScans(const std::filesystem::path& recording,
                                      SourceOptions source,

@@ -16,9 +16,11 @@ EDGES = {
     "eval": ["io"],
     "config": [],
     "mapping": ["io", "registration", "splat"],
+    "mesh": ["io", "splat"],
     "slam": ["mapping", "registration", "splat"],
     "report": ["eval", "io", "slam", "mapping", "splat"],
-    "apps": ["config", "eval", "io", "mapping", "registration", "report", "sim", "slam", "splat"],
+    "apps": ["config", "eval", "io", "mapping", "mesh", "registration", "report", "sim", "slam",
+             "splat"],
 }
 INCLUDE = re.compile(r'#include\s+"covsplat/(\w+)/')
 

@@ -29,6 +29,15 @@ void AddEvalTrajectoryCommand(CLI::App& eval, int& exit_code);
 /// eval map <mesh or cloud> <truth>
 void AddEvalMapCommand(CLI::App& eval, int& exit_code);
 
+/// mesh <run folder>
+void AddMeshCommand(CLI::App& app, int& exit_code);
+
+/// render <run folder>
+void AddRenderCommand(CLI::App& app, int& exit_code);
+
+/// export <run folder>
+void AddExportCommand(CLI::App& app, int& exit_code);
+
 /// config dump | check | describe
 void AddConfigCommand(CLI::App& app, int& exit_code);
 

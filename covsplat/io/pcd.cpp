@@ -7,6 +7,7 @@
 
 #include <liblzf/lzf.h>
 
+#include "covsplat/io/output_file.hpp"
 #include "covsplat/io/pcd_header.hpp"
 #include "covsplat/io/text.hpp"
 
@@ -144,6 +145,42 @@ Result<PointTable> ParseCompressed(std::string_view body,
   return std::move(layout.table);
 }
 
+char TypeLetter(ScalarType type) {
+  switch (type) {
+    case ScalarType::kFloat32:
+    case ScalarType::kFloat64:
+      return 'F';
+    case ScalarType::kInt8:
+    case ScalarType::kInt16:
+    case ScalarType::kInt32:
+    case ScalarType::kInt64:
+      return 'I';
+    default:
+      return 'U';
+  }
+}
+
+std::string WrittenHeader(const PointTable& points) {
+  std::string fields = "FIELDS", sizes = "SIZE", types = "TYPE", counts = "COUNT";
+  for (const PointColumn& column : points.columns) {
+    fields += " " + column.name;
+    sizes += fmt::format(" {}", SizeOf(column.Type()));
+    types += fmt::format(" {}", TypeLetter(column.Type()));
+    counts += " 1";
+  }
+  std::string text = "# .PCD v0.7 - Point Cloud Data file format\n";
+  for (const std::string& comment : points.comments) text += "# " + comment + "\n";
+  return text + fmt::format(
+                    "VERSION 0.7\n{}\n{}\n{}\n{}\nWIDTH {}\nHEIGHT 1\n"
+                    "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\nDATA binary\n",
+                    fields,
+                    sizes,
+                    types,
+                    counts,
+                    points.Rows(),
+                    points.Rows());
+}
+
 }  // namespace
 
 Result<PointTable> ReadPcd(const std::filesystem::path& path) {
@@ -159,6 +196,19 @@ Result<PointTable> ParsePcd(std::string_view bytes, const std::string& file) {
   const std::string_view body = bytes.substr(header->offset);
   if (header->data == "binary") return ParseBinary(body, *header, file);
   return ParseCompressed(body, *header, file);
+}
+
+Result<void> WritePcd(const std::filesystem::path& path, const PointTable& points) {
+  std::string bytes = WrittenHeader(points);
+  std::size_t stride = 0;
+  for (const PointColumn& column : points.columns) stride += SizeOf(column.Type());
+  std::size_t first = bytes.size();
+  bytes.resize(first + stride * points.Rows());
+  for (const PointColumn& column : points.columns) {
+    CopyBytes(column.values, bytes.data() + first, stride);
+    first += SizeOf(column.Type());
+  }
+  return WriteFileAtomically(path, bytes);
 }
 
 }  // namespace covsplat

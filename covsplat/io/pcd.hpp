@@ -18,4 +18,7 @@ Result<PointTable> ReadPcd(const std::filesystem::path& path);
 /// The same from bytes in memory; `file` is for messages.
 Result<PointTable> ParsePcd(std::string_view bytes, const std::string& file);
 
+/// Writes all columns as a binary PCD, at once. Comments go into the header.
+Result<void> WritePcd(const std::filesystem::path& path, const PointTable& points);
+
 }  // namespace covsplat

@@ -65,6 +65,17 @@ std::string VertexBytes(const PointTable& vertices, const std::string& more_head
   return bytes;
 }
 
+void AddColumns(const std::array<const char*, 3>& names,
+                const std::vector<Eigen::Vector3f>& vectors,
+                PointTable& table) {
+  for (std::size_t axis = 0; axis < names.size(); ++axis) {
+    std::vector<float> values;
+    values.reserve(vectors.size());
+    for (const Eigen::Vector3f& v : vectors) values.push_back(v[static_cast<int>(axis)]);
+    table.columns.push_back({names[axis], std::move(values)});
+  }
+}
+
 }  // namespace
 
 Result<PointTable> ReadPly(const std::filesystem::path& path) {
@@ -136,13 +147,10 @@ Result<void> WritePlyMesh(const std::filesystem::path& path,
 }
 
 Result<void> WriteTriangleMesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  COVSPLAT_CHECK(mesh.normals.empty() || mesh.normals.size() == mesh.vertices.size());
   PointTable vertices;
-  constexpr std::array kNames = {"x", "y", "z"};
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<float> values;
-    for (const Eigen::Vector3f& vertex : mesh.vertices) values.push_back(vertex[axis]);
-    vertices.columns.push_back({kNames[static_cast<std::size_t>(axis)], std::move(values)});
-  }
+  AddColumns({"x", "y", "z"}, mesh.vertices, vertices);
+  if (!mesh.normals.empty()) AddColumns({"nx", "ny", "nz"}, mesh.normals, vertices);
   return WritePlyMesh(path, vertices, mesh.triangles);
 }
 

@@ -32,7 +32,7 @@ Result<void> WritePlyMesh(const std::filesystem::path& path,
                           const PointTable& vertices,
                           std::span<const Eigen::Vector3i> triangles);
 
-/// A mesh with no more than positions.
+/// A mesh: positions, normals where there are any, and triangles.
 Result<void> WriteTriangleMesh(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 }  // namespace covsplat

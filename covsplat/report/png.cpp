@@ -39,6 +39,10 @@ Result<std::vector<std::uint8_t>> EncodePng(const Image<std::uint8_t>& gray) {
   return Encode(gray.Pixels().data(), gray.Rows(), gray.Columns(), PNG_FORMAT_GRAY);
 }
 
+Result<std::vector<std::uint8_t>> EncodePng(const Image<std::uint16_t>& gray) {
+  return Encode(gray.Pixels().data(), gray.Rows(), gray.Columns(), PNG_FORMAT_LINEAR_Y);
+}
+
 std::string Base64(std::span<const std::uint8_t> bytes) {
   constexpr std::string_view kLetters =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

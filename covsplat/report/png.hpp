@@ -22,6 +22,8 @@ struct Rgb {
 /// The bytes of a PNG file; an empty image is an error.
 Result<std::vector<std::uint8_t>> EncodePng(const Image<Rgb>& image);
 Result<std::vector<std::uint8_t>> EncodePng(const Image<std::uint8_t>& gray);
+/// 16 bits as they are, for measurements.
+Result<std::vector<std::uint8_t>> EncodePng(const Image<std::uint16_t>& gray);
 
 /// RFC 4648, with padding, without line breaks.
 std::string Base64(std::span<const std::uint8_t> bytes);

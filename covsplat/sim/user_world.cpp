@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-#include "covsplat/io/mesh_file.hpp"
+#include "covsplat/io/mesh_reader.hpp"
 #include "covsplat/io/text.hpp"
 #include "covsplat/io/trajectory_file.hpp"
 

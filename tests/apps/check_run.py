@@ -128,6 +128,52 @@ def the_saved_configuration_gives_the_same_run(bench):
 
 
 @case
+def a_finished_run_becomes_meshes_clouds_and_renderings(bench):
+    expect(bench.run(bench.good, "run", "--threads", "2"), 0)
+    run = bench.folder / "run"
+    coarse = ["--voxel", "0.3", "-s", "view.columns=256"]
+    expect(bench.call("mesh", run, *coarse), 0, out="triangles")
+    assert (run / "mesh.ply").read_bytes().startswith(b"ply")
+    expect(bench.call("mesh", run, "-o", "a.glb", *coarse, "--threads", "1"), 0)
+    assert (bench.folder / "a.glb").read_bytes().startswith(b"glTF")
+    expect(bench.call("mesh", run, "-o", "a.obj", *coarse, "-s", "max_tile_blocks=200"), 0)
+    assert (bench.folder / "a.obj").read_text().startswith("v ")
+    for name in ["a.ply", "a.pcd"]:
+        expect(bench.call("export", run, "-o", name), 0, out="points")
+    expect(bench.call("render", run, "-o", "seen", "--every", "4"), 0, out=f"{SCANS // 4} views")
+    for folder in ["range", "normal", "opacity"]:
+        images = list((bench.folder / "seen" / folder).glob("*.png"))
+        assert len(images) == SCANS // 4, images
+    expect(bench.call("info", bench.folder / "seen"), 0, out="KITTI")
+    expect(bench.call("render", run, "-o", "seen"), 4, err="not empty")
+    expect(bench.call("render", run, "-o", "seen", "--overwrite", "--sensor", "vlp-16", "--poses",
+                      run / "trajectory_tum.txt", "--every", "6"), 0, out="16 x ")
+    assert len(list((bench.folder / "seen" / "range").glob("*.png"))) == SCANS // 6
+
+
+@case
+def broken_runs_are_input_errors_that_name_the_file(bench):
+    expect(bench.run(bench.good, "whole"), 0)
+    whole = bench.folder / "whole"
+    (bench.folder / "nothing").mkdir()
+    for verb in ["mesh", "render", "export"]:
+        expect(bench.call(verb, "nowhere"), 3, err="nowhere")
+        expect(bench.call(verb, bench.folder / "nothing"), 3, err="config.yaml")
+    expect(bench.call("mesh", whole, "-o", "mesh.stl"), 2, err=".glb")
+    expect(bench.call("mesh", whole, "-s", "voxel=1"), 2, err="voxel_m")
+    expect(bench.call("export", whole, "-o", "cloud.las"), 2, err=".pcd")
+    expect(bench.call("render", whole, "--sensor", "os9", "-o", "x"), 2, err="os0-128")
+    expect(bench.call("render", whole, "--poses", "no.txt", "-o", "x"), 3, err="no.txt")
+    rows = (whole / "frames.csv").read_text().splitlines(keepends=True)
+    (whole / "frames.csv").write_text("".join(rows[:1]))
+    expect(bench.call("mesh", whole), 3, err="not of one run")
+    (whole / "trajectory_tum.txt").write_text("")
+    expect(bench.call("mesh", whole), 3, err="no scans")
+    (whole / "frames.csv").write_text("scan,stamp_s\n")
+    expect(bench.call("mesh", whole), 3, err="keyframe")
+
+
+@case
 def wrong_requests_are_usage_errors(bench):
     expect(bench.run(bench.good, "x", "--nonsense"), 2, err="--nonsense")
     expect(bench.run(bench.good, "x", "-s", "gicp.max_iteration=3"), 2, err="gicp.max_iterations")

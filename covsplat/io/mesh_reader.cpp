@@ -1,4 +1,4 @@
-#include "covsplat/io/mesh_file.hpp"
+#include "covsplat/io/mesh_reader.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,0 +1,19 @@
+// Fusion: rendered views into a signed distance field.
+#pragma once
+
+#include "covsplat/mesh/depth_view.hpp"
+#include "covsplat/mesh/voxel_grid.hpp"
+
+namespace covsplat {
+
+/// Adds a view to every block it sees: each voxel gathers the plane of the pixel that it falls on,
+/// so blocks are independent and the sums come out the same for any number of threads and any
+/// choice of blocks. Voxels in front of a surface are free, those behind it by more than the
+/// truncation are hidden.
+void FuseView(const ViewCamera& camera,
+              const DepthView& view,
+              const MeshConfig& config,
+              VoxelGrid& grid,
+              ThreadPool& pool);
+
+}  // namespace covsplat

@@ -1,0 +1,97 @@
+#include "covsplat/mesh/surfel_map.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace covsplat {
+namespace {
+
+bool IsSound(const GaussianColumns<float>& table, std::size_t i) {
+  for (int p = 0; p < kParameterCount; ++p) {
+    if (!std::isfinite(table.Column(p)[i])) return false;
+  }
+  double norm = 0.0;
+  for (int p = kQuatW; p <= kQuatZ; ++p) norm += std::pow(table.Column(p)[i], 2.0);
+  return norm > 1e-6;
+}
+
+/// Row `i` of a table in the map frame becomes row `row` of a table in another frame.
+void MoveInto(const SE3& T_anchor_map,
+              const GaussianColumns<float>& from,
+              std::size_t i,
+              GaussianColumns<float>& to,
+              std::size_t row) {
+  for (int p = 0; p < kParameterCount; ++p) to.Column(p)[row] = from.Column(p)[i];
+  const Eigen::Vector3d mean(
+      from.Column(kMeanX)[i], from.Column(kMeanY)[i], from.Column(kMeanZ)[i]);
+  const Eigen::Quaterniond rotation(from.Column(kQuatW)[i],
+                                    from.Column(kQuatX)[i],
+                                    from.Column(kQuatY)[i],
+                                    from.Column(kQuatZ)[i]);
+  const Eigen::Vector3d moved = T_anchor_map * mean;
+  const Eigen::Quaterniond turned = T_anchor_map.Rotation() * rotation.normalized();
+  for (int k = 0; k < 3; ++k) {
+    to.Column(kMeanX + k)[row] = static_cast<float>(moved[k]);
+    to.Column(kQuatX + k)[row] = static_cast<float>(turned.vec()[k]);
+  }
+  to.Column(kQuatW)[row] = static_cast<float>(turned.w());
+}
+
+}  // namespace
+
+std::size_t DropBroken(SurfelMap& map) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < map.Size(); ++i) {
+    if (!IsSound(map.gaussians, i)) continue;
+    map.gaussians.MoveRow(i, kept);
+    map.keyframe[kept] = map.keyframe[i];
+    map.confidence[kept] = map.confidence[i];
+    ++kept;
+  }
+  const std::size_t dropped = map.Size() - kept;
+  map.gaussians.Resize(kept);
+  map.keyframe.resize(kept);
+  map.confidence.resize(kept);
+  return dropped;
+}
+
+Result<std::unique_ptr<SplatEngine>> MakeMapEngine(const SurfelMap& map,
+                                                   Backend backend,
+                                                   const SensorModel& sensor,
+                                                   const EngineConfig& config,
+                                                   ThreadPool& pool) {
+  Result<std::unique_ptr<SplatEngine>> engine = MakeSplatEngine(backend, sensor, config, pool);
+  if (!engine) return engine;
+  std::vector<std::vector<std::size_t>> rows(map.T_map_keyframe.size());
+  for (std::size_t i = 0; i < map.Size(); ++i) {
+    rows[static_cast<std::size_t>(map.keyframe[i])].push_back(i);
+  }
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const int anchor = (*engine)->AddAnchor(map.T_map_keyframe[k]);
+    if (rows[k].empty()) continue;
+    const SE3 T_anchor_map = map.T_map_keyframe[k].Inverse();
+    GaussianColumns<float> table;
+    table.Resize(rows[k].size());
+    for (std::size_t row = 0; row < rows[k].size(); ++row) {
+      MoveInto(T_anchor_map, map.gaussians, rows[k][row], table, row);
+    }
+    (*engine)->Append(anchor, table);
+  }
+  return engine;
+}
+
+double VoxelFor(const SurfelMap& map) {
+  std::vector<float> extent(map.Size());
+  for (std::size_t i = 0; i < map.Size(); ++i) {
+    extent[i] = std::exp(
+        std::min(map.gaussians.Column(kLogScaleU)[i], map.gaussians.Column(kLogScaleV)[i]));
+  }
+  const auto middle = extent.begin() + static_cast<std::ptrdiff_t>(extent.size() / 2);
+  std::nth_element(extent.begin(), middle, extent.end());
+  const double voxel = std::clamp(0.5 * static_cast<double>(*middle), 0.02, 0.5);
+  const double digit = std::pow(10.0, std::floor(std::log10(voxel)) - 1.0);
+  return std::round(voxel / digit) * digit;
+}
+
+}  // namespace covsplat

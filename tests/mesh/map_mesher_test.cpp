@@ -1,0 +1,240 @@
+// Maps whose surface is known: Gaussians that tile walls, seen from where a sensor would have been.
+#include "covsplat/mesh/map_mesher.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tests/mesh/mesh_checks.hpp"
+#include <gtest/gtest.h>
+
+namespace covsplat::test {
+namespace {
+
+using Vector = Eigen::Vector3d;
+
+constexpr double kVoxel = 0.1;
+constexpr double kSpacing = 0.1;
+
+SensorModel Sensor() { return UniformSensorModel(64, 512, -0.7, 0.7, 0.3, 40.0); }
+
+SE3 At(double x, double y, double z) { return {Eigen::Quaterniond::Identity(), Vector(x, y, z)}; }
+
+struct Disc {
+  Vector mean;
+  Vector normal;
+};
+
+/// Fills the rectangle of `centre` +- `u` +- `v` with discs that face the side of u x v.
+void Tile(const Vector& centre, const Vector& u, const Vector& v, std::vector<Disc>& discs) {
+  const int columns = static_cast<int>(std::round(2.0 * u.norm() / kSpacing));
+  const int rows = static_cast<int>(std::round(2.0 * v.norm() / kSpacing));
+  for (int i = 0; i < columns; ++i) {
+    for (int j = 0; j < rows; ++j) {
+      discs.push_back(
+          {centre + u * ((2.0 * i + 1.0) / columns - 1.0) + v * ((2.0 * j + 1.0) / rows - 1.0),
+           u.cross(v).normalized()});
+    }
+  }
+}
+
+SurfelMap MapOf(const std::vector<Disc>& discs, std::vector<SE3> keyframes) {
+  SurfelMap map;
+  map.T_map_keyframe = std::move(keyframes);
+  map.gaussians.Resize(discs.size());
+  map.keyframe.assign(discs.size(), 0);
+  map.confidence.assign(discs.size(), 1.0f);
+  for (std::size_t i = 0; i < discs.size(); ++i) {
+    const auto q = Eigen::Quaterniond::FromTwoVectors(Vector::UnitZ(), discs[i].normal);
+    const double scale = std::log(0.6 * kSpacing);
+    const std::array<double, kParameterCount> row = {discs[i].mean.x(),
+                                                     discs[i].mean.y(),
+                                                     discs[i].mean.z(),
+                                                     q.w(),
+                                                     q.x(),
+                                                     q.y(),
+                                                     q.z(),
+                                                     scale,
+                                                     scale,
+                                                     3.0};
+    for (int p = 0; p < kParameterCount; ++p) {
+      map.gaussians.Column(p)[i] = static_cast<float>(row[static_cast<std::size_t>(p)]);
+    }
+  }
+  return map;
+}
+
+MeshConfig Config() {
+  MeshConfig config;
+  config.voxel_m = kVoxel;
+  config.threads = 1;
+  config.view.columns = 512;
+  return config;
+}
+
+Result<MeshResult> Mesh(const SurfelMap& map, const MeshConfig& config) {
+  return MeshOfMap(
+      map, map.T_map_keyframe, Sensor(), Backend::kCpu, RasterConfig(), config, nullptr);
+}
+
+/// The inside of a box of 4 x 3 x 2 m.
+std::vector<Disc> Room() {
+  std::vector<Disc> discs;
+  const Vector x(2.0, 0.0, 0.0), y(0.0, 1.5, 0.0), z(0.0, 0.0, 1.0);
+  Tile(-x, y, z, discs);
+  Tile(x, z, y, discs);
+  Tile(-y, z, x, discs);
+  Tile(y, x, z, discs);
+  Tile(-z, x, y, discs);
+  Tile(z, y, x, discs);
+  return discs;
+}
+
+double DistanceToRoom(const Vector& p) {
+  const Vector q = p.cwiseAbs() - Vector(2.0, 1.5, 1.0);
+  return q.maxCoeff() <= 0.0 ? -q.maxCoeff() : q.cwiseMax(0.0).norm();
+}
+
+SurfelMap RoomMap() {
+  return MapOf(Room(), {At(0.0, 0.0, 0.0), At(1.0, 0.4, 0.2), At(-1.0, -0.5, -0.2)});
+}
+
+TEST(MapMesher, ARoomIsAccurateToAFifthOfAVoxelAndItsEdgesStaySharp) {
+  const MeshResult result = Mesh(RoomMap(), Config()).value();
+  const TriangleMesh& mesh = result.mesh;
+  ASSERT_GT(mesh.triangles.size(), 3000u);
+  std::vector<double> distances;
+  double corner = 1.0;
+  for (const Eigen::Vector3f& v : mesh.vertices) {
+    distances.push_back(DistanceToRoom(v.cast<double>()));
+    corner = std::min(corner, (v.cast<double>() - Vector(2.0, 1.5, 0.0)).head<2>().norm());
+  }
+  std::sort(distances.begin(), distances.end());
+  EXPECT_LT(distances[distances.size() / 2], 0.02 * kVoxel);
+  EXPECT_LT(distances[distances.size() * 99 / 100], 0.2 * kVoxel);
+  EXPECT_LT(corner, 0.2 * kVoxel);
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    EXPECT_LT(mesh.normals[i].dot(mesh.vertices[i]), 0.0f);  // into the room
+  }
+}
+
+TEST(MapMesher, ThreadsAndTilesLeaveNoTrace) {
+  const SurfelMap map = RoomMap();
+  const MeshResult whole = Mesh(map, Config()).value();
+  MeshConfig config = Config();
+  config.threads = 2;
+  config.max_tile_blocks = 64;
+  const MeshResult tiled = Mesh(map, config).value();
+  EXPECT_EQ(whole.tiles, 1u);
+  EXPECT_GT(tiled.tiles, 2u);
+  EXPECT_EQ(whole.mesh.vertices, tiled.mesh.vertices);
+  EXPECT_EQ(whole.mesh.normals, tiled.mesh.normals);
+  EXPECT_EQ(whole.mesh.triangles, tiled.mesh.triangles);
+}
+
+TEST(MapMesher, AThinWallSeenFromBothSidesNeitherVanishesNorThickens) {
+  constexpr double kHalf = 0.1;  // two voxels thick
+  std::vector<Disc> discs;
+  const Vector y(0.0, 2.0, 0.0), z(0.0, 0.0, 1.5);
+  Tile(Vector(kHalf, 0.0, 0.0), y, z, discs);
+  Tile(Vector(-kHalf, 0.0, 0.0), z, y, discs);
+  const SurfelMap map = MapOf(
+      discs, {At(2.0, 0.5, 0.0), At(2.0, -0.5, 0.0), At(-2.0, 0.5, 0.0), At(-2.0, -0.5, 0.0)});
+  const TriangleMesh mesh = Mesh(map, Config()).value().mesh;
+  std::array<std::size_t, 2> side{};
+  for (const Eigen::Vector3f& v : mesh.vertices) {
+    if (std::abs(v.y()) > 1.8f || std::abs(v.z()) > 1.3f) continue;  // the rim
+    EXPECT_NEAR(std::abs(v.x()), kHalf, 0.25 * kVoxel);
+    ++side[v.x() > 0.0f];
+  }
+  EXPECT_GT(side[0], 800u);
+  EXPECT_GT(side[1], 800u);
+}
+
+TEST(MapMesher, WhatOnlyOneViewShowsInFreeSpaceIsCarvedAway) {
+  // A sheet in the middle of the room that faces one keyframe only, as a passer-by would leave it;
+  // the others look through it from the side it was not seen from.
+  std::vector<Disc> discs = Room();
+  const std::size_t walls = discs.size();
+  Tile(Vector(0.5, 0.0, 0.0), Vector(0.0, 0.3, 0.0), Vector(0.0, 0.0, 0.3), discs);
+  SurfelMap map = MapOf(discs,
+                        {At(1.2, 0.0, 0.0),
+                         At(-0.6, 0.0, 0.0),
+                         At(-0.8, 0.5, 0.0),
+                         At(-0.8, -0.5, 0.0),
+                         At(-1.2, 0.0, 0.3)});
+  ASSERT_GT(map.Size(), walls);
+  const TriangleMesh mesh = Mesh(map, Config()).value().mesh;
+  const auto ghosts =
+      std::count_if(mesh.vertices.begin(), mesh.vertices.end(), [](const Eigen::Vector3f& v) {
+        return (v - Eigen::Vector3f(0.5f, 0.0f, 0.0f)).norm() < 0.5f;
+      });
+  EXPECT_EQ(ghosts, 0);
+}
+
+TEST(MapMesher, FarFromTheOriginIsAsAccurateAsNear) {
+  std::vector<Disc> discs = Room();
+  const Vector far(900.0, -700.0, 30.0);
+  for (Disc& disc : discs) disc.mean += far;
+  const SurfelMap map =
+      MapOf(discs, {At(far.x(), far.y(), far.z()), At(far.x() + 1.0, far.y(), far.z())});
+  const TriangleMesh mesh = Mesh(map, Config()).value().mesh;
+  std::vector<double> distances;
+  for (const Eigen::Vector3f& v : mesh.vertices) {
+    distances.push_back(DistanceToRoom(v.cast<double>() - far));
+  }
+  std::sort(distances.begin(), distances.end());
+  EXPECT_LT(distances[distances.size() / 2], 0.02 * kVoxel);
+}
+
+TEST(MapMesher, MapsWithoutSurfaceAreErrorsThatSaySo) {
+  const auto empty = Mesh(MapOf({}, {At(0.0, 0.0, 0.0)}), Config());
+  ASSERT_FALSE(empty);
+  EXPECT_EQ(empty.error().code, ErrorCode::kInput);
+  // One disc that faces away from the only keyframe.
+  const auto hidden =
+      Mesh(MapOf({{Vector(2.0, 0.0, 0.0), Vector::UnitX()}}, {At(0.0, 0.0, 0.0)}), Config());
+  ASSERT_FALSE(hidden);
+  EXPECT_NE(hidden.error().message.find("no surface"), std::string::npos);
+  // One that is too far away for the numbering of voxels.
+  const auto far =
+      Mesh(MapOf({{Vector(1e6, 0.0, 0.0), Vector::UnitX()}}, {At(0.0, 0.0, 0.0)}), Config());
+  ASSERT_FALSE(far);
+  EXPECT_EQ(far.error().code, ErrorCode::kUsage);
+}
+
+TEST(MapMesher, StopsWhenAsked) {
+  const auto stop = [](const MeshProgress& progress) { return progress.done < 2; };
+  const SurfelMap map = RoomMap();
+  const MeshResult result =
+      MeshOfMap(map, map.T_map_keyframe, Sensor(), Backend::kCpu, RasterConfig(), Config(), stop)
+          .value();
+  EXPECT_TRUE(result.interrupted);
+  EXPECT_TRUE(result.mesh.triangles.empty());
+}
+
+TEST(SurfelMap, BrokenGaussiansAreDroppedAndCounted) {
+  SurfelMap map = MapOf(Room(), {At(0.0, 0.0, 0.0)});
+  const std::size_t size = map.Size();
+  map.gaussians.Column(kMeanY)[3] = std::numeric_limits<float>::quiet_NaN();
+  map.gaussians.Column(kLogScaleU)[7] = std::numeric_limits<float>::infinity();
+  for (int p = kQuatW; p <= kQuatZ; ++p) map.gaussians.Column(p)[9] = 0.0f;
+  EXPECT_EQ(DropBroken(map), 3u);
+  EXPECT_EQ(map.Size(), size - 3);
+  EXPECT_EQ(map.keyframe.size(), size - 3);
+  EXPECT_EQ(map.confidence.size(), size - 3);
+  EXPECT_TRUE(Mesh(map, Config()));
+}
+
+TEST(SurfelMap, ViewsAreKeyframesAndThenScansThatAreFarFromAllOfThem) {
+  const SurfelMap map = MapOf({}, {At(0.0, 0.0, 0.0), At(5.0, 0.0, 0.0)});
+  Trajectory path;
+  for (int i = 0; i <= 50; ++i) path.push_back({0.1 * i, At(0.1 * i, 0.0, 0.0)});
+  const std::vector<SE3> views = ChooseViews(map, path, 1.0);
+  ASSERT_EQ(views.size(), 6u);
+  EXPECT_NEAR(views[2].Translation().x(), 1.0, 1e-9);
+  EXPECT_NEAR(views[5].Translation().x(), 4.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace covsplat::test
