@@ -13,7 +13,8 @@ std::array<CellEdge, kCellEdges> MakeEdges() {
     const int last = 1 << (axis + 2) % 3;
     for (int k = 0; k < 4; ++k) {
       const int from = (k & 1) * next + (k >> 1) * last;
-      edges[static_cast<std::size_t>(4 * axis + k)] = {axis, from, from + (1 << axis)};
+      const int e = 4 * axis + k;
+      edges[static_cast<std::size_t>(e)] = {axis, from, from + (1 << axis)};
     }
   }
   return edges;

@@ -211,8 +211,9 @@ class BlockContour {
                                      v * Eigen::Vector3i::Unit((axis + 2) % 3);
       Cell cell;
       if (!LoadCell(padded_, corner, cell)) return;
-      const auto edge = static_cast<std::size_t>(4 * axis + u + 2 * v);
-      quad[k] = KeyOf(first_ + corner, SheetsOf(cell.negative).sheet_of_edge[edge]);
+      const int edge = 4 * axis + u + 2 * v;
+      quad[k] = KeyOf(first_ + corner,
+                      SheetsOf(cell.negative).sheet_of_edge[static_cast<std::size_t>(edge)]);
     }
     if (!inside) std::swap(quad[1], quad[3]);
     piece.quads.push_back(quad);

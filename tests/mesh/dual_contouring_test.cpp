@@ -69,7 +69,7 @@ double Box(const Vector& p) {
   return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
 }
 
-TEST(DualContouring, ASphereIsWatertightFacesOutwardsAndIsAccurateToAHundredthOfAVoxel) {
+TEST(DualContouring, ASphereIsWatertightFacesOutwardsAndIsAccurateToThreeHundredthsOfAVoxel) {
   const TriangleMesh mesh = MeshOf(Sphere, 1000, 1);
   EXPECT_TRUE(IsWatertight(mesh));
   EXPECT_LT(Farthest(mesh, [](const Vector& p) { return std::abs(Sphere(p)); }), 0.03 * kVoxel);
