@@ -1,10 +1,13 @@
 #include "apps/run_conclusion.hpp"
 
+#include <utility>
+
 #include "apps/run_pictures.hpp"
 #include "apps/run_report.hpp"
 #include <fmt/format.h>
 
 #include "covsplat/io/output_file.hpp"
+#include "covsplat/io/trajectory_file.hpp"
 #include "covsplat/mapping/map_file.hpp"
 #include "covsplat/report/report.hpp"
 
@@ -43,6 +46,18 @@ void Evaluate(RunResults& results) {
       {-1, fmt::format("{}: has no pose at the time of any scan", results.truth->path.string())});
 }
 
+/// Where the Gaussians' keyframes are, in the order of their numbers.
+Trajectory KeyframesOf(const SlamSystem& system, const RunResults& results) {
+  const GaussianMap& map = system.GetMapper().Map();
+  Trajectory keyframes;
+  for (int k = 0; k < map.Keyframes(); ++k) {
+    const std::int64_t scan = system.KeyframeScans()[static_cast<std::size_t>(k)];
+    const double stamp_s = results.records[RecordOf(results, scan)].stamp_s;
+    keyframes.push_back({stamp_s, map.KeyframePose(k)});
+  }
+  return keyframes;
+}
+
 }  // namespace
 
 Result<void> ConcludeRun(SlamSystem& system,
@@ -62,6 +77,9 @@ Result<void> ConcludeRun(SlamSystem& system,
     results.map_bytes =
         static_cast<double>(std::filesystem::file_size(folder / "map.ply", ignored));
   }
+  const auto keyframes =
+      WriteTum(folder / "keyframes_tum.txt", KeyframesOf(std::as_const(system), results));
+  if (written) written = keyframes;
   Evaluate(results);
   const Result<void> measured = MeasureMap(system, config.slam, results);
   if (written) written = measured;

@@ -40,11 +40,8 @@ void AddTrajectory(const SlamSystem& system, const RunResults& results, ReportDa
   for (const ScanRecord& r : results.records) {
     data.trajectory_m.push_back(r.T_map_sensor.Translation());
   }
-  const auto at_scan = [](const ScanRecord& r, std::int64_t scan) { return r.scan < scan; };
   for (const std::int64_t scan : system.KeyframeScans()) {
-    const auto found =
-        std::lower_bound(results.records.begin(), results.records.end(), scan, at_scan);
-    data.keyframes.push_back(static_cast<std::size_t>(found - results.records.begin()));
+    data.keyframes.push_back(RecordOf(results, scan));
   }
 }
 

@@ -85,6 +85,15 @@ Trajectory TrajectoryOf(const RunResults& results) {
   return trajectory;
 }
 
+std::size_t RecordOf(const RunResults& results, std::int64_t scan) {
+  const auto found = std::lower_bound(
+      results.records.begin(),
+      results.records.end(),
+      scan,
+      [](const ScanRecord& record, std::int64_t number) { return record.scan < number; });
+  return static_cast<std::size_t>(found - results.records.begin());
+}
+
 double PathLengthOf(const RunResults& results) {
   std::vector<SE3> poses;
   for (const ScanRecord& record : results.records) poses.push_back(record.T_map_sensor);

@@ -64,6 +64,8 @@ struct RunResults {
 
 /// Of the tracked scans, at mid scan.
 Trajectory TrajectoryOf(const RunResults& results);
+/// Where in `records` a scan is, or would be.
+std::size_t RecordOf(const RunResults& results, std::int64_t scan);
 double PathLengthOf(const RunResults& results);
 std::int64_t LostScans(const RunResults& results);
 double ScansPerSecond(const RunResults& results);

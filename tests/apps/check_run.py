@@ -16,7 +16,7 @@ import time
 SCANS = 12
 LIMIT_S = 600  # of one call, for machines and builds that are slow
 SMALL = ["-s", "lidar.rows=32", "-s", "lidar.columns=256"]
-FILES = ["config.yaml", "frames.csv", "map.ply", "metrics.json", "report.html",
+FILES = ["config.yaml", "frames.csv", "keyframes_tum.txt", "map.ply", "metrics.json", "report.html",
          "trajectory_kitti.txt", "trajectory_tum.txt"]
 CASES = []
 
@@ -122,7 +122,7 @@ def the_saved_configuration_gives_the_same_run(bench):
     expect(bench.run(bench.good, "again", "-c", first / "config.yaml"), 0, out="as configured")
     expect(bench.run(bench.good, "other", "--deterministic", "--threads", "2"), 0)
     for name in ["again", "other"]:
-        for file in ["trajectory_tum.txt", "trajectory_kitti.txt", "map.ply"]:
+        for file in ["trajectory_tum.txt", "trajectory_kitti.txt", "keyframes_tum.txt", "map.ply"]:
             same = (first / file).read_bytes() == (bench.folder / name / file).read_bytes()
             assert same, f"{file} of {name} differs"
 
@@ -164,13 +164,12 @@ def broken_runs_are_input_errors_that_name_the_file(bench):
     expect(bench.call("export", whole, "-o", "cloud.las"), 2, err=".pcd")
     expect(bench.call("render", whole, "--sensor", "os9", "-o", "x"), 2, err="os0-128")
     expect(bench.call("render", whole, "--poses", "no.txt", "-o", "x"), 3, err="no.txt")
-    rows = (whole / "frames.csv").read_text().splitlines(keepends=True)
-    (whole / "frames.csv").write_text("".join(rows[:1]))
+    (whole / "keyframes_tum.txt").write_text("")
     expect(bench.call("mesh", whole), 3, err="not of one run")
-    (whole / "trajectory_tum.txt").write_text("")
-    expect(bench.call("mesh", whole), 3, err="no scans")
-    (whole / "frames.csv").write_text("scan,stamp_s\n")
-    expect(bench.call("mesh", whole), 3, err="keyframe")
+    (whole / "keyframes_tum.txt").write_text("0 1 2\n")
+    expect(bench.call("mesh", whole), 3, err="keyframes_tum.txt:1")
+    (whole / "keyframes_tum.txt").unlink()
+    expect(bench.call("mesh", whole), 3, err="keyframes_tum.txt")
 
 
 @case
