@@ -48,7 +48,7 @@ def draw_tracks(rows: list[report.Row], file: Path) -> None:
         bars = axis.barh(
             [row.method for row in shown], errors_m, color=[colour(row.method) for row in shown]
         )
-        axis.bar_label(bars, [f"{error_m:.3f}" for error_m in errors_m], padding=2, fontsize=7)
+        axis.bar_label(bars, [f"{error_m:.3g}" for error_m in errors_m], padding=2, fontsize=7)
         axis.set_xscale("log")
         axis.set_title(f"{name}: ATE RMSE in metres ({shown[0].measured_by})", fontsize=8)
         axis.margins(x=0.15)
@@ -82,6 +82,7 @@ def panels(bars: list[int], columns: int) -> tuple:
 
     matplotlib.use("svg")
     matplotlib.rcParams["svg.hashsalt"] = "covsplat"  # the same bytes for the same numbers
+    matplotlib.rcParams["svg.fonttype"] = "none"  # letters as letters: smaller files
     from matplotlib import pyplot
 
     heights = [count + 2.5 for count in bars]
