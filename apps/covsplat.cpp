@@ -25,6 +25,7 @@ int Run(int argc, char** argv) {
   AddSimulateCommand(app, exit_code);
   AddInfoCommand(app, exit_code);
   AddEvalCommand(app, exit_code);
+  AddBenchCommand(app, exit_code);
   AddConfigCommand(app, exit_code);
   try {
     app.parse(argc, argv);

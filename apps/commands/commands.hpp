@@ -23,6 +23,9 @@ void AddInfoCommand(CLI::App& app, int& exit_code);
 /// eval traj <estimate> <truth>
 void AddEvalCommand(CLI::App& app, int& exit_code);
 
+/// bench kitti | newer_college | oxford_spires
+void AddBenchCommand(CLI::App& app, int& exit_code);
+
 /// config dump | check | describe
 void AddConfigCommand(CLI::App& app, int& exit_code);
 
