@@ -1,7 +1,7 @@
 #include "apps/own_verb.hpp"
 
 #include <cerrno>
-#include <cstring>
+#include <system_error>
 
 #include <fcntl.h>
 #include <spawn.h>
@@ -38,6 +38,7 @@ Result<void> RunOwnVerb(const std::vector<std::string>& words, const std::filesy
   std::vector<std::string> owned = {"covsplat"};
   owned.insert(owned.end(), words.begin(), words.end());
   std::vector<char*> arguments;
+  arguments.reserve(owned.size() + 1);
   for (std::string& word : owned) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   const StdoutToFile redirect(out);
@@ -49,7 +50,7 @@ Result<void> RunOwnVerb(const std::vector<std::string>& words, const std::filesy
                 "covsplat {} cannot be started, with {} for its output: {}",
                 words.front(),
                 out.string(),
-                std::strerror(failed));
+                std::generic_category().message(failed));
   }
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
