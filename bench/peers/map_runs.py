@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -105,20 +106,31 @@ def mesh_covsplat(setting: Setting) -> map_peers.MapOutcome:
     )
 
 
-def measure(setting: Setting, name: str, make: Make) -> Row:
-    method, _, poses = name.partition("; ")
+def measure(setting: Setting, chosen: Sequence[tuple[str, Make]]) -> list[Row]:
+    """Surfaces are made one after the other, for the sake of the times, and judged all at once."""
+    made = [(name, attempt(make)) for name, make in chosen]
+    with ThreadPoolExecutor(setting.threads) as pool:
+        return list(pool.map(lambda one: judge(setting, *one), made))
+
+
+def attempt(make: Make) -> map_peers.MapOutcome | Exception:
     try:
-        made = make()
-        scores = score_mesh(
-            setting.covsplat,
-            made.mesh,
-            setting.recording,
-            TAUS_M,
-            setting.threads,
-            made.trajectory,
-        )
+        return make()
     except Exception as error:  # a failed method is a row of the table, not the end of the others
-        return Row(setting.recording.name, method, poses, failure=str(error))
+        return error
+
+
+def judge(setting: Setting, name: str, made: map_peers.MapOutcome | Exception) -> Row:
+    method, _, poses = name.partition("; ")
+    failed = partial(Row, setting.recording.name, method, poses)
+    if isinstance(made, Exception):
+        return failed(failure=str(made))
+    try:
+        scores = score_mesh(
+            setting.covsplat, made.mesh, setting.recording, TAUS_M, 1, made.trajectory
+        )
+    except Exception as error:
+        return failed(failure=str(error))
     return Row(
         setting.recording.name,
         method,

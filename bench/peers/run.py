@@ -95,10 +95,14 @@ def compare(recording: Recording, options: argparse.Namespace, results: page.Res
     if options.covsplat is None or recording.true_mesh is None or recording.name in options.no_map:
         return
     setting = map_runs.Setting(options.covsplat, recording, out, options.voxel, options.threads)
-    for name, make in map_runs.methods(setting):
-        if options.only.search(f"{recording.name}, map, {name}"):
-            results.maps.append(map_runs.measure(setting, name, make))
-            print(" | ".join(map_runs.cells(results.maps[-1])), flush=True)
+    chosen = [
+        (name, make)
+        for name, make in map_runs.methods(setting)
+        if options.only.search(f"{recording.name}, map, {name}")
+    ]
+    for row in map_runs.measure(setting, chosen):
+        results.maps.append(row)
+        print(" | ".join(map_runs.cells(row)), flush=True)
 
 
 def write(results: page.Results, about: dict[str, object], options: argparse.Namespace) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+import map_peers
 import map_runs
 import page
 import plots
@@ -131,6 +132,23 @@ class CovsplatRunTest(unittest.TestCase):
             score = score_mesh(binary, folder / "mesh.ply", recording, (0.05,), 2, None)
             self.assertEqual(score.triangles, 7)
             self.assertEqual(score.strict.f_percent, {0.05: 90})
+
+
+class MapRunsTest(unittest.TestCase):
+    def test_a_method_that_fails_is_a_row_and_the_others_go_on(self) -> None:
+        def fails() -> map_peers.MapOutcome:
+            raise RuntimeError("out of voxels")
+
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            recording = Recording(folder, np.array([0.0]), None)
+            setting = map_runs.Setting(folder / "none", recording, folder, 0.1, 2)
+            mesh = folder / "mesh.ply"
+            made = map_peers.MapOutcome(mesh, 1, 1.0, 1.0, 1.0, 1.0)
+            rows = map_runs.measure(setting, [("one; true", fails), ("two; true", lambda: made)])
+            self.assertEqual([(row.method, row.poses) for row in rows][0], ("one", "true"))
+            self.assertEqual(rows[0].failure, "out of voxels")
+            self.assertIn("none", rows[1].failure or "")  # there is no program to judge it
 
 
 class ReportTest(unittest.TestCase):
