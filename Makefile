@@ -4,6 +4,9 @@
 
 COVSPLAT_DATA ?= ../shared/data
 THREADS ?= 2
+# Of bench-peers: the simulated worlds, and a regular expression for what of it to run.
+WORLDS ?= courtyard college street
+ONLY ?=
 
 help:  ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1\t\2/' | \
@@ -35,12 +38,18 @@ bench: setup build-release  ## Run the benchmarks
 	.venv/bin/pip install --quiet --disable-pip-version-check -r $<
 	@touch $@
 
-bench-peers: setup build-release .venv/peers  ## Compare with KISS-ICP and small_gicp: docs/benchmarks.md
-	build/release/apps/covsplat simulate courtyard -o bench_out/courtyard --overwrite
+SENSOR_courtyard = --sensor os1-64 --motion walking
+SENSOR_college = --sensor os1-64 --motion walking
+SENSOR_street = --sensor hdl-64e --motion vehicle
+
+simulate-%: build-release
+	build/release/apps/covsplat simulate $* $(SENSOR_$*) -o bench_out/$* --overwrite
+
+bench-peers: setup build-release .venv/peers $(addprefix simulate-,$(WORLDS))  ## Compare with the peers: docs/benchmarks.md
 	.venv/bin/python bench/peers/run.py --covsplat build/release/apps/covsplat \
-	  --recording bench_out/courtyard --data $(COVSPLAT_DATA) \
+	  $(WORLDS:%=--recording bench_out/%) --no-map street --data $(COVSPLAT_DATA) \
 	  --azimuth-time kitti_raw_0005=0.1033 --threads $(THREADS) --out bench_out \
-	  --update docs/benchmarks.md
+	  $(if $(ONLY),--only '$(ONLY)',--update docs/benchmarks.md)
 
 .venv/oracles: tools/oracles/requirements.txt
 	@tools/setup.sh --with-oracles

@@ -28,6 +28,7 @@ int Run(int argc, char** argv) {
   AddMeshCommand(app, exit_code);
   AddRenderCommand(app, exit_code);
   AddExportCommand(app, exit_code);
+  AddBenchCommand(app, exit_code);
   AddConfigCommand(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -38,6 +38,9 @@ void AddRenderCommand(CLI::App& app, int& exit_code);
 /// export <run folder>
 void AddExportCommand(CLI::App& app, int& exit_code);
 
+/// bench kitti | newer_college | oxford_spires
+void AddBenchCommand(CLI::App& app, int& exit_code);
+
 /// config dump | check | describe
 void AddConfigCommand(CLI::App& app, int& exit_code);
 

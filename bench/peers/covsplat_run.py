@@ -1,25 +1,25 @@
-"""Runs the covsplat binary on a recording and reads what it wrote."""
+"""Runs the covsplat binary and reads what it wrote."""
 
 from __future__ import annotations
 
 import csv
 import json
-import resource
-import subprocess
+from dataclasses import dataclass
 from pathlib import Path
 
 from peers import Outcome
+from processes import Finished, run_program
 from recording import Recording
 from se3 import Trajectory
 
 
 def run_covsplat(
     binary: Path, recording: Recording, out: Path, threads: int, *, mapping: bool
-) -> tuple[Outcome, float | None]:
-    """The outcome and scans per second of the whole run, the mapper's work included.
+) -> Outcome:
+    """Its scans per second are those of the whole run, the mapper's work included.
 
-    The times per scan are the tracker's ("scan in to pose out"). CPU time is the process's, with
-    reading, mapping and writing: an upper bound next to the peers'.
+    The times per scan are the tracker's ("scan in to pose out"). CPU time and peak memory are the
+    process's, with reading, mapping and writing: upper bounds next to the peers'.
     """
     command = [str(binary), "run", str(recording.folder), "-o", str(out), "--overwrite"]
     command += ["--threads", str(threads)]
@@ -28,19 +28,14 @@ def run_covsplat(
         command += ["-s", f"deskew.scan_period_s={recording.azimuth_period_s}"]
     if not mapping:
         command += ["-s", "mapping.enabled=false"]
-    before_s = children_cpu_s()
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        message = done.stderr.strip() or done.stdout.strip()
-        raise RuntimeError(f"exit code {done.returncode}: {message[-300:]}")
-    cpu_ms = (children_cpu_s() - before_s) * 1e3 / len(recording)
-    trajectory = Trajectory.read_tum(out / "trajectory_tum.txt")
-    return Outcome(trajectory, track_times(out), cpu_ms), scans_per_s(out)
-
-
-def children_cpu_s() -> float:
-    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return usage.ru_utime + usage.ru_stime
+    done = run_program(command)
+    return Outcome(
+        Trajectory.read_tum(out / "trajectory_tum.txt"),
+        track_times(out),
+        done.cpu_s * 1e3 / len(recording),
+        done.peak_mib,
+        scans_per_s(out),
+    )
 
 
 def track_times(out: Path) -> list[float]:
@@ -56,3 +51,56 @@ def scans_per_s(out: Path) -> float | None:
     metrics = json.loads((out / "metrics.json").read_text())
     value = metrics.get("time", {}).get("scans_per_s")
     return None if value is None else float(value)
+
+
+@dataclass(frozen=True)
+class SurfaceScore:
+    """By one protocol of `covsplat eval map`; docs/metrics.md defines both."""
+
+    accuracy_cm: float
+    completeness_cm: float
+    chamfer_l1_cm: float
+    f_percent: dict[float, float]  # by tau in metres
+
+    @staticmethod
+    def of(errors: dict) -> SurfaceScore:
+        return SurfaceScore(
+            errors["accuracy_cm"],
+            errors["completeness_cm"],
+            errors["chamfer_l1_cm"],
+            {score["tau_m"]: score["f_score_percent"] for score in errors["scores"]},
+        )
+
+
+@dataclass(frozen=True)
+class MeshScore:
+    triangles: int
+    paper: SurfaceScore
+    strict: SurfaceScore
+
+
+def mesh_of_run(binary: Path, out: Path, mesh: Path, voxel_m: float, threads: int) -> Finished:
+    command = [str(binary), "mesh", str(out), "-o", str(mesh), "--voxel", str(voxel_m)]
+    return run_program([*command, "--threads", str(threads), "--quiet"])
+
+
+def score_mesh(
+    binary: Path,
+    mesh: Path,
+    recording: Recording,
+    taus_m: tuple[float, ...],
+    threads: int,
+    trajectory: Path | None,
+) -> MeshScore:
+    """`trajectory`: that the mesh was made with, if not the truth; aligns it with the truth."""
+    command = [str(binary), "eval", "map", str(mesh), str(recording.true_mesh)]
+    command += ["--recording", str(recording.folder), "--threads", str(threads)]
+    command += ["--tau", ",".join(str(tau_m) for tau_m in taus_m), "--json", "--quiet"]
+    if trajectory is not None:
+        command += ["--trajectory", str(trajectory)]
+    found = json.loads(run_program(command).stdout)
+    return MeshScore(
+        found["result"]["triangles"],
+        SurfaceScore.of(found["paper"]),
+        SurfaceScore.of(found["strict"]),
+    )

@@ -1,8 +1,7 @@
-"""The peers. Each sees the same scans one after the other; only its own work is timed."""
+"""The peers that track. Each sees the same scans in turn; only its own work is timed."""
 
 from __future__ import annotations
 
-import resource
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from processes import own_cpu_s, own_peak_mib
 from recording import Recording, Scan, deskewed
 from se3 import Array, Trajectory, inverse, orthonormal
 
@@ -26,11 +26,8 @@ class Outcome:
     trajectory: Trajectory
     wall_ms: list[float] = field(default_factory=list)  # per scan
     cpu_ms: float | None = None  # per scan, all threads
-
-
-def process_cpu_s() -> float:
-    usage = resource.getrusage(resource.RUSAGE_SELF)
-    return usage.ru_utime + usage.ru_stime
+    peak_mib: float | None = None  # of the whole process
+    scans_per_s: float | None = None  # if it is not what follows from wall_ms
 
 
 def timed_run(recording: Recording, step: Step, prepare: Callable[[Scan], Scan]) -> Outcome:
@@ -41,14 +38,19 @@ def timed_run(recording: Recording, step: Step, prepare: Callable[[Scan], Scan])
     cpu_s = 0.0
     for index in range(len(recording)):
         scan = prepare(recording.scan(index))
-        cpu_start_s, start_s = process_cpu_s(), time.perf_counter()
+        cpu_start_s, start_s = own_cpu_s(), time.perf_counter()
         stamp_s, pose = step(scan)
         wall_ms.append((time.perf_counter() - start_s) * 1e3)
-        cpu_s += process_cpu_s() - cpu_start_s
+        cpu_s += own_cpu_s() - cpu_start_s
         times_s.append(stamp_s)
         poses.append(pose)
     trajectory = Trajectory.from_matrices(np.array(times_s), np.array(poses))
-    return Outcome(trajectory, wall_ms, cpu_s * 1e3 / len(recording))
+    return Outcome(trajectory, wall_ms, cpu_s * 1e3 / len(recording), own_peak_mib())
+
+
+def no_offsets_if_none(scan: Scan) -> Array:
+    """As KISS-ICP wants the times of points."""
+    return scan.offsets_s if scan.offsets_s is not None else np.empty(0)
 
 
 def run_kiss_icp(recording: Recording, threads: int) -> Outcome:
@@ -70,11 +72,44 @@ def run_kiss_icp(recording: Recording, threads: int) -> Outcome:
     odometry = KissICP(config)
 
     def step(scan: Scan) -> tuple[float, Array]:
-        offsets_s = scan.offsets_s if scan.offsets_s is not None else np.empty(0)
-        odometry.register_frame(scan.points, offsets_s)
+        odometry.register_frame(scan.points, no_offsets_if_none(scan))
         return scan.end_s, odometry.last_pose.copy()
 
     return timed_run(recording, step, prepare=lambda scan: scan)
+
+
+def run_kiss_slam(recording: Recording, threads: int) -> Outcome:
+    """KISS-ICP, MapClosures and a pose graph with their defaults; the poses are the final ones.
+
+    They are of the scans' ends, as KISS-ICP's. The last optimisation counts for scans per second.
+    """
+    from kiss_slam.config import load_config
+    from kiss_slam.slam import KissSLAM
+
+    config = load_config(None)
+    config.odometry.preprocessing.max_range = 100.0
+    config.odometry.preprocessing.deskew = recording.has_point_times
+    config.odometry.mapping.voxel_size = 1.0
+    config.odometry.registration.max_num_threads = threads
+    slam = KissSLAM(config)
+
+    def step(scan: Scan) -> tuple[float, Array]:
+        slam.process_scan(scan.points, no_offsets_if_none(scan))
+        return scan.end_s, np.eye(4)
+
+    outcome = timed_run(recording, step, prepare=lambda scan: scan)
+    cpu_start_s, start_s = own_cpu_s(), time.perf_counter()
+    slam.generate_new_node()
+    slam.local_map_graph.erase_last_local_map()
+    poses, _ = slam.fine_grained_optimization()
+    finish_s = time.perf_counter() - start_s
+    return Outcome(
+        Trajectory.from_matrices(outcome.trajectory.times_s, np.array(poses)),
+        outcome.wall_ms,
+        outcome.cpu_ms + (own_cpu_s() - cpu_start_s) * 1e3 / len(recording),
+        own_peak_mib(),
+        len(recording) / (sum(outcome.wall_ms) / 1e3 + finish_s),
+    )
 
 
 class SmallGicp:

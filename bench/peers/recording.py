@@ -25,6 +25,10 @@ class Scan:
         return self.stamp_s + float(self.offsets_s.min() + self.offsets_s.max()) / 2
 
     @property
+    def start_s(self) -> float:
+        return self.stamp_s + (0.0 if self.offsets_s is None else float(self.offsets_s.min()))
+
+    @property
     def end_s(self) -> float:
         return self.stamp_s + (0.0 if self.offsets_s is None else float(self.offsets_s.max()))
 
@@ -55,6 +59,11 @@ class Recording:
     def has_point_times(self) -> bool:
         return self.azimuth_period_s is not None or (self.folder / "timestamps").is_dir()
 
+    @property
+    def true_mesh(self) -> Path | None:
+        path = self.folder / "gt_mesh.ply"
+        return path if path.is_file() else None
+
     def __len__(self) -> int:
         return len(self.stamps_s)
 
@@ -83,17 +92,25 @@ class Recording:
         return Trajectory.from_matrices(self.stamps_s, poses)
 
 
-def deskewed(scan: Scan, truth: Trajectory) -> Array:
-    """The points in the sensor's frame at the middle of the scan, moved with the true motion."""
+def deskewed(scan: Scan, trajectory: Trajectory) -> Array:
+    """The points in the sensor's frame at the middle of the scan, moved with the trajectory."""
     if scan.offsets_s is None:
         return scan.points
     times_s, which = np.unique(scan.stamp_s + scan.offsets_s, return_inverse=True)
-    poses = truth.at(times_s)
-    middle = truth.at(np.array([scan.middle_s]))
-    T_world_middle = np.eye(4)
-    T_world_middle[:3, :3] = rotations_of(middle.quaternions)[0]
-    T_world_middle[:3, 3] = middle.positions[0]
-    T_middle_world = inverse(T_world_middle)
+    poses = trajectory.at(times_s)
+    T_middle_world = inverse(trajectory.pose_at(scan.middle_s))
     rotations = T_middle_world[:3, :3] @ rotations_of(poses.quaternions)
     positions = poses.positions @ T_middle_world[:3, :3].T + T_middle_world[:3, 3]
     return np.einsum("nij,nj->ni", rotations[which], scan.points) + positions[which]
+
+
+def placed(scan: Scan, trajectory: Trajectory) -> tuple[Array, Array] | None:
+    """Deskewed points and the sensor's position at the middle, in the trajectory's world.
+
+    Nothing for a scan that the trajectory does not wholly cover: its skew is not known.
+    """
+    if not len(scan.points) or not trajectory.covers(np.array([scan.start_s, scan.end_s])).all():
+        return None
+    pose = trajectory.pose_at(scan.middle_s)
+    points = deskewed(scan, trajectory)
+    return points @ pose[:3, :3].T + pose[:3, 3], pose[:3, 3]

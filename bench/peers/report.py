@@ -1,27 +1,23 @@
-"""Rows of the comparison, as a table, as JSON and between the markers of docs/benchmarks.md."""
+"""Rows of the comparison of trajectories."""
 
 from __future__ import annotations
 
-import importlib.metadata
-import json
-import os
-import subprocess
-from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-BEGIN, END = "<!-- peers:begin -->", "<!-- peers:end -->"
 HEADER = (
     "recording",
     "method",
     "poses",
     "ATE RMSE m",
     "max m",
+    "RPE m",
     "ms/scan median",
     "p95",
     "CPU-ms/scan",
     "threads",
     "scans/s",
+    "peak MiB",
 )
 
 
@@ -37,9 +33,11 @@ class Row:
     poses: int = 0  # compared ones
     ate_rmse_m: float | None = None
     ate_max_m: float | None = None
+    rpe_rmse_m: float | None = None  # over 1 m of the way
     median_ms: float | None = None
     p95_ms: float | None = None
     cpu_ms: float | None = None
+    peak_mib: float | None = None
     scans_per_s: float | None = None
     failure: str | None = None
 
@@ -56,76 +54,16 @@ def cells(row: Row) -> list[str]:
         f"{row.poses}/{row.scans}",
         number(row.ate_rmse_m, 4),
         number(row.ate_max_m, 4),
+        number(row.rpe_rmse_m, 4),
         number(row.median_ms, 1),
         number(row.p95_ms, 1),
         number(row.cpu_ms, 1),
         str(row.threads),
         number(row.scans_per_s, 1),
+        number(row.peak_mib, 0),
     ]
 
 
-def table(rows: list[Row]) -> str:
-    lines = [HEADER, tuple("---" for _ in HEADER), *(tuple(cells(row)) for row in rows)]
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [header, ["---"] * len(header), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def command_output(*command: str) -> str:
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-    except OSError:
-        return ""
-    return done.stdout.strip()
-
-
-def version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "not installed"
-
-
-def cpu_model() -> str:
-    for line in Path("/proc/cpuinfo").read_text().splitlines():
-        if line.startswith("model name"):
-            return line.split(":", 1)[1].strip()
-    return "unknown"
-
-
-def circumstances(command: str, load_before: tuple[float, float, float]) -> dict[str, object]:
-    root = str(Path(__file__).resolve().parent)
-    commit = command_output("git", "-C", root, "rev-parse", "--short", "HEAD")
-    changed = command_output("git", "-C", root, "status", "--porcelain", "--untracked-files=no")
-    return {
-        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        "command": command,
-        "commit": commit + (" with local changes" if changed else ""),
-        "cpu": cpu_model(),
-        "cores": len(os.sched_getaffinity(0)),
-        "load_before": load_before[0],
-        "load_after": os.getloadavg()[0],
-        "versions": {name: version(name) for name in ("kiss-icp", "small-gicp", "numpy")},
-    }
-
-
-def markdown(rows: list[Row], about: dict[str, object]) -> str:
-    versions = ", ".join(f"{name} {number}" for name, number in dict(about["versions"]).items())
-    intro = (
-        f"{about['date']}, commit {about['commit']}, {about['cpu']}, {about['cores']} cores, "
-        f"load average {about['load_before']:.1f} before and {about['load_after']:.1f} after; "
-        f"{versions}.\n\n`{about['command']}`"
-    )
-    return f"{intro}\n\n{table(rows)}\n"
-
-
-def as_json(rows: list[Row], about: dict[str, object]) -> str:
-    return json.dumps({"about": about, "rows": [asdict(row) for row in rows]}, indent=2) + "\n"
-
-
-def update(page: Path, text: str) -> None:
-    """Replaces what stands between the markers."""
-    content = page.read_text()
-    if content.count(BEGIN) != 1 or content.count(END) != 1:
-        raise SystemExit(f"{page}: needs the lines {BEGIN} and {END} once each")
-    head, rest = content.split(BEGIN)
-    _, tail = rest.split(END)
-    page.write_text(f"{head}{BEGIN}\n{text}{END}{tail}")

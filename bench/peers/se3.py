@@ -41,6 +41,11 @@ class Trajectory:
         first, last = self.times_s[0] - slack_s, self.times_s[-1] + slack_s
         return (times_s >= first) & (times_s <= last)
 
+    def within(self, other: Trajectory) -> Trajectory:
+        """The poses at times that the other one covers."""
+        covered = other.covers(self.times_s)
+        return Trajectory(self.times_s[covered], self.positions[covered], self.quaternions[covered])
+
     def at(self, times_s: Array) -> Trajectory:
         """Positions linear, rotations on the great circle; all times must be covered."""
         times_s = np.asarray(times_s, float)
@@ -56,6 +61,16 @@ class Trajectory:
         positions = (1 - weight) * self.positions[before] + weight * self.positions[after]
         rotations = slerp(self.quaternions[before], self.quaternions[after], weight)
         return Trajectory(times_s, positions, rotations)
+
+    def pose_at(self, time_s: float) -> Array:
+        return self.at(np.array([time_s])).matrices()[0]
+
+    def matrices(self) -> Array:
+        """[N, 4, 4]"""
+        poses = np.tile(np.eye(4), (len(self.times_s), 1, 1))
+        poses[:, :3, :3] = rotations_of(self.quaternions)
+        poses[:, :3, 3] = self.positions
+        return poses
 
 
 def slerp(first: Array, second: Array, weight: Array) -> Array:
@@ -131,3 +146,20 @@ def position_errors(estimate: Array, truth: Array) -> Array:
     rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
     aligned = (estimate - centre_e) @ rotation.T + centre_t
     return np.linalg.norm(aligned - truth, axis=1)
+
+
+def relative_errors(estimate: Array, truth: Array, distance_m: float) -> Array:
+    """Errors in metres of the motion over consecutive steps of poses [N, 4, 4].
+
+    A step ends at the first pose from which the truth's way since the start of the step is
+    `distance_m` or more (docs/metrics.md).
+    """
+    way_m = np.zeros(len(truth))
+    way_m[1:] = np.cumsum(np.linalg.norm(np.diff(truth[:, :3, 3], axis=0), axis=1))
+    ends = [0]
+    while (end := int(np.searchsorted(way_m, way_m[ends[-1]] + distance_m - 1e-9))) < len(truth):
+        ends.append(end)
+    first, last = ends[:-1], ends[1:]
+    true_motion = np.linalg.inv(truth[first]) @ truth[last]
+    motion = np.linalg.inv(estimate[first]) @ estimate[last]
+    return np.linalg.norm((np.linalg.inv(true_motion) @ motion)[:, :3, 3], axis=1)

@@ -8,10 +8,21 @@ from pathlib import Path
 
 import numpy as np
 
+import map_peers
+import map_runs
+import page
+import plots
 import report
-from covsplat_run import run_covsplat
-from recording import Recording, Scan, deskewed
-from se3 import Trajectory, orthonormal, position_errors, quaternion_of, rotations_of
+from covsplat_run import MeshScore, SurfaceScore, run_covsplat, score_mesh
+from recording import Recording, Scan, deskewed, placed
+from se3 import (
+    Trajectory,
+    orthonormal,
+    position_errors,
+    quaternion_of,
+    relative_errors,
+    rotations_of,
+)
 
 
 def turn_about_z(angle_rad: float) -> np.ndarray:
@@ -44,6 +55,17 @@ class Se3Test(unittest.TestCase):
         self.assertLess(position_errors(moved, truth).max(), 1e-12)
         self.assertGreater(position_errors(1.1 * truth, truth).max(), 0.01)
 
+    def test_relative_errors_see_the_drift_and_not_where_the_path_lies(self) -> None:
+        truth = np.tile(np.eye(4), (11, 1, 1))
+        truth[:, 0, 3] = 0.5 * np.arange(11)
+        moved = turn_about_z(1.0) @ truth
+        self.assertLess(relative_errors(moved, truth, 1.0).max(), 1e-12)
+        stretched = truth.copy()
+        stretched[:, 0, 3] *= 1.02
+        errors = relative_errors(stretched, truth, 1.0)
+        np.testing.assert_allclose(errors, np.full(5, 0.02))
+        self.assertEqual(len(relative_errors(truth[:2], truth[:2], 1.0)), 0)
+
 
 class DeskewTest(unittest.TestCase):
     def test_a_moving_sensor_sees_the_scene_of_the_middle(self) -> None:
@@ -57,7 +79,18 @@ class DeskewTest(unittest.TestCase):
         seen = np.einsum("nji,nj->ni", rotations_of(at.quaternions), scene - at.positions)
         middle = truth.at(np.array([1.0]))
         expected = (scene - middle.positions) @ rotations_of(middle.quaternions)[0]
-        np.testing.assert_allclose(deskewed(Scan(1.0, seen, offsets_s), truth), expected, atol=1e-9)
+        scan = Scan(1.0, seen, offsets_s)
+        np.testing.assert_allclose(deskewed(scan, truth), expected, atol=1e-9)
+        points, origin = placed(scan, truth)
+        np.testing.assert_allclose(points, scene, atol=1e-9)
+        np.testing.assert_allclose(origin, [2, 0, 0], atol=1e-9)
+
+    def test_scans_that_the_trajectory_does_not_cover_are_left_out(self) -> None:
+        still = Trajectory.from_matrices(np.array([0.0, 1.0]), np.tile(np.eye(4), (2, 1, 1)))
+        seen, offsets_s = np.ones((2, 3)), np.array([-0.05, 0.05])
+        self.assertIsNotNone(placed(Scan(0.5, seen, offsets_s), still))
+        self.assertIsNone(placed(Scan(0.0, seen, offsets_s), still))
+        self.assertIsNone(placed(Scan(0.5, np.empty((0, 3)), np.empty(0)), still))
 
 
 FAKE_BINARY = """#!/bin/sh
@@ -77,22 +110,81 @@ class CovsplatRunTest(unittest.TestCase):
             binary.write_text(FAKE_BINARY)
             binary.chmod(0o755)
             recording = Recording(folder, np.array([0.0, 0.1]), 0.1)
-            outcome, rate = run_covsplat(binary, recording, folder, 2, mapping=True)
+            outcome = run_covsplat(binary, recording, folder, 2, mapping=True)
             np.testing.assert_allclose(outcome.trajectory.positions[:, 0], [0, 1])
-            self.assertEqual((outcome.wall_ms, rate), ([12.5, 7.5], 9.5))
+            self.assertEqual((outcome.wall_ms, outcome.scans_per_s), ([12.5, 7.5], 9.5))
+            self.assertGreater(outcome.peak_mib, 0)
             with self.assertRaisesRegex(RuntimeError, "exit code 4"):
                 run_covsplat(binary, recording, folder / "nowhere", 2, mapping=True)
+
+    def test_reads_the_scores_of_a_mesh(self) -> None:
+        errors = (
+            '{"accuracy_cm": 1, "completeness_cm": 2, "chamfer_l1_cm": 1.5,'
+            ' "scores": [{"tau_m": 0.05, "f_score_percent": 90}]}'
+        )
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            binary = folder / "covsplat"
+            found = f'{{"result": {{"triangles": 7}}, "paper": {errors}, "strict": {errors}}}'
+            binary.write_text(f"#!/bin/sh\necho '{found}'\n")
+            binary.chmod(0o755)
+            recording = Recording(folder, np.array([0.0]), None)
+            score = score_mesh(binary, folder / "mesh.ply", recording, (0.05,), 2, None)
+            self.assertEqual(score.triangles, 7)
+            self.assertEqual(score.strict.f_percent, {0.05: 90})
+
+
+class MapRunsTest(unittest.TestCase):
+    def test_a_method_that_fails_is_a_row_and_the_others_go_on(self) -> None:
+        def fails() -> map_peers.MapOutcome:
+            raise RuntimeError("out of voxels")
+
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            recording = Recording(folder, np.array([0.0]), None)
+            setting = map_runs.Setting(folder / "none", recording, folder, 0.1, 2)
+            mesh = folder / "mesh.ply"
+            made = map_peers.MapOutcome(mesh, 1, 1.0, 1.0, 1.0, 1.0)
+            rows = map_runs.measure(setting, [("one; true", fails), ("two; true", lambda: made)])
+            self.assertEqual([(row.method, row.poses) for row in rows][0], ("one", "true"))
+            self.assertEqual(rows[0].failure, "out of voxels")
+            self.assertIn("none", rows[1].failure or "")  # there is no program to judge it
 
 
 class ReportTest(unittest.TestCase):
     def test_only_what_stands_between_the_markers_changes(self) -> None:
         with tempfile.TemporaryDirectory() as name:
-            page = Path(name) / "page.md"
-            page.write_text(f"before\n{report.BEGIN}\nold\n{report.END}\nafter\n")
-            report.update(page, "new\n")
-            self.assertEqual(
-                page.read_text(), f"before\n{report.BEGIN}\nnew\n{report.END}\nafter\n"
-            )
+            path = Path(name) / "page.md"
+            path.write_text(f"before\n{page.BEGIN}\nold\n{page.END}\nafter\n")
+            page.update(path, "new\n")
+            self.assertEqual(path.read_text(), f"before\n{page.BEGIN}\nnew\n{page.END}\nafter\n")
+
+    def test_rows_have_the_cells_of_their_header(self) -> None:
+        scored = SurfaceScore(1.0, 2.0, 1.5, dict.fromkeys(map_runs.TAUS_M, 90.0))
+        maps = [
+            map_runs.Row("world", "good", "true", MeshScore(7, scored, scored)),
+            map_runs.Row("world", "bad", "true", failure="it broke | badly"),
+        ]
+        for row in maps:
+            self.assertEqual(len(map_runs.cells(row)), len(map_runs.HEADER))
+        tracks = [report.Row("world", "good", "exact truth", 2, 10, ate_rmse_m=0.1)]
+        self.assertEqual(len(report.cells(tracks[0])), len(report.HEADER))
+        results = page.Results(tracks, maps)
+        self.assertFalse(results.complete)
+        text = page.markdown(results, page.circumstances("run", (0.0, 0.0, 0.0)))
+        self.assertIn("it broke \\| badly", text)
+        self.check_plots(results)
+
+    def check_plots(self, results: page.Results) -> None:
+        try:
+            import matplotlib  # noqa: F401
+        except ImportError:
+            self.skipTest("matplotlib is not installed")
+        with tempfile.TemporaryDirectory() as name:
+            drawn = plots.draw(results, Path(name))
+            self.assertEqual(len(drawn), 2)
+            for _, file in drawn:
+                self.assertIn("</svg>", file.read_text())
 
 
 class KissIcpPoseTimeTest(unittest.TestCase):

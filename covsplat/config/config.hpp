@@ -12,6 +12,9 @@ namespace covsplat {
 
 namespace internal {
 Result<void> LoadYaml(const std::string& path, const ConfigSchema& schema);
+Result<void> LoadYamlText(const std::string& text,
+                          const std::string& name,
+                          const ConfigSchema& schema);
 Result<void> ApplyOverride(std::string_view assignment, const ConfigSchema& schema);
 Result<void> CheckConfig(const ConfigSchema& schema);
 std::string DumpYaml(const ConfigSchema& schema);
@@ -33,6 +36,14 @@ template <class Config>
 Result<void> LoadYaml(const std::string& path, Config& config) {
   return internal::Transact(
       config, [&](const ConfigSchema& schema) { return internal::LoadYaml(path, schema); });
+}
+
+/// The same from text; `name` stands for the file in errors.
+template <class Config>
+Result<void> LoadYamlText(const std::string& text, const std::string& name, Config& config) {
+  return internal::Transact(config, [&](const ConfigSchema& schema) {
+    return internal::LoadYamlText(text, name, schema);
+  });
 }
 
 /// Applies one "section.key=value". Lists are written "[1, 2, 3]" or "1,2,3".

@@ -154,11 +154,17 @@ class Loader {
 Result<void> LoadYaml(const std::string& path, const ConfigSchema& schema) {
   const Result<std::string> text = ReadText(path);
   if (!text) return Forward(text);
+  return LoadYamlText(*text, path, schema);
+}
+
+Result<void> LoadYamlText(const std::string& text,
+                          const std::string& path,
+                          const ConfigSchema& schema) {
   try {
-    if (HasSecondDocument(*text)) {
+    if (HasSecondDocument(text)) {
       return Fail(ErrorCode::kUsage, "{}: must hold one YAML document and nothing else", path);
     }
-    const YAML::Node root = YAML::Load(*text);
+    const YAML::Node root = YAML::Load(text);
     if (root.IsNull()) return {};
     if (!root.IsMap()) {
       return FailAt(path, root.Mark().line, "the file must consist of 'section:' and 'key: value'");

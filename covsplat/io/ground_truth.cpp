@@ -92,4 +92,14 @@ Result<std::optional<GroundTruth>> FindGroundTruth(const fs::path& recording,
   return found(path, WithStamps(*poses, *stamps, path));
 }
 
+Result<Trajectory> ReadOdometryTruth(const fs::path& poses,
+                                     const fs::path& recording,
+                                     double scan_period_s) {
+  const Result<std::vector<SE3>> read = ReadOdometryPoses(poses, recording / "calib.txt");
+  if (!read) return Forward(read);
+  const Result<std::vector<double>> stamps = StampsFor(recording, read->size(), scan_period_s);
+  if (!stamps) return Forward(stamps);
+  return WithStamps(*read, *stamps, poses);
+}
+
 }  // namespace covsplat

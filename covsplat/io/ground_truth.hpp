@@ -23,4 +23,10 @@ struct GroundTruth {
 Result<std::optional<GroundTruth>> FindGroundTruth(const std::filesystem::path& recording,
                                                    double scan_period_s = 0.1);
 
+/// The last of these, from a given file of poses, whatever else lies with the recording
+/// (SemanticKITTI puts a poses.txt of an estimate there).
+Result<Trajectory> ReadOdometryTruth(const std::filesystem::path& poses,
+                                     const std::filesystem::path& recording,
+                                     double scan_period_s = 0.1);
+
 }  // namespace covsplat

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "covsplat/io/kitti_scan.hpp"
+#include "covsplat/io/name_stamp.hpp"
 #include "covsplat/io/pcd.hpp"
 #include "covsplat/io/ply.hpp"
 #include "covsplat/io/table_scan.hpp"
@@ -87,9 +88,10 @@ std::string FolderSource::Description() const {
   const std::string_view point_times = !is_kitti ? "time per point where the files have one"
                                        : layout_.point_time_folder.empty() ? "no time per point"
                                                                            : "with time per point";
-  const std::string stamps = stamps_s_.empty()
-                                 ? fmt::format("one scan every {} s", options_.scan_period_s)
-                                 : std::string("with times.txt");
+  const std::string stamps =
+      stamps_s_.empty()
+          ? fmt::format("one scan every {} s", options_.scan_period_s)
+          : std::string(layout_.stamp_file.empty() ? "with times for names" : "with times.txt");
   return fmt::format("{} folder, {} scans, {}, {}", kind, count_, stamps, point_times);
 }
 
@@ -107,7 +109,7 @@ std::vector<double> StampsByNumber(const std::vector<std::filesystem::path>& fil
 }
 
 Result<std::vector<double>> StampsOf(const RecordingLayout& layout) {
-  if (layout.stamp_file.empty()) return std::vector<double>();
+  if (layout.stamp_file.empty()) return StampsOfNames(layout.files);
   Result<std::vector<double>> stamps = ReadStamps(layout.stamp_file);
   if (!stamps || stamps->size() == layout.files.size()) return stamps;
   std::vector<double> chosen;

@@ -35,7 +35,8 @@ struct SourceOptions {
 };
 
 /// Opens a folder of scans. Stamps come from absolute times of the points, else from times.txt
-/// (one line per scan, or per number that a file has for a name), else from the number of the scan.
+/// (one line per scan, or per number that a file has for a name), else from the names of the files
+/// (StampOfName), else from the number of the scan.
 Result<std::unique_ptr<ScanSource>> OpenScanSource(const std::filesystem::path& folder,
                                                    const SourceOptions& options);
 
