@@ -6,6 +6,7 @@
 #include "covsplat/mesh/clean_mesh.hpp"
 #include "covsplat/mesh/dual_contouring.hpp"
 #include "covsplat/mesh/fusion.hpp"
+#include "covsplat/mesh/surfel_fusion.hpp"
 #include "covsplat/mesh/tiling.hpp"
 
 namespace covsplat {
@@ -95,6 +96,7 @@ Result<MeshResult> MeshOfMap(const SurfelMap& map,
         return result;
       }
     }
+    FuseSurfels(map, config, grid, pool);
     pieces.push_back(Contour(grid, tiles[t].own, {config.min_weight, config.sharpness}, pool));
   }
   result.mesh = JoinPieces(std::move(pieces));

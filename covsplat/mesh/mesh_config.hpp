@@ -49,6 +49,7 @@ struct MeshConfig {
   double voxel_m = 0.0;
   double truncation_voxels = 3.0;
   double min_weight = 0.1;
+  double surfel_weight = 0.12;
   double sharpness = 0.9;
   double min_component_m2 = 0.1;
   int max_tile_blocks = 40000;
@@ -70,6 +71,10 @@ struct MeshConfig {
             Range{1e-3, 1e6},
             "voxels that were observed with less than this have no surface: a head-on view of an "
             "opaque surface counts 1");
+    v.Field("surfel_weight",
+            c.surfel_weight,
+            Range{0.0, 1e3},
+            "what a Gaussian's own disc counts in its middle, beside the views; 0: views alone");
     v.Field("sharpness",
             c.sharpness,
             Range{0.0, 1.0},

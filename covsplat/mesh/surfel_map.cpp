@@ -40,6 +40,22 @@ void MoveInto(const SE3& T_anchor_map,
 
 }  // namespace
 
+SurfelDisc DiscOf(const SurfelMap& map, std::size_t i) {
+  constexpr double kSigmas = 2.0;
+  constexpr double kMaxRadiusM = 5.0;  // maps have none that large
+  const GaussianColumns<float>& table = map.gaussians;
+  const Eigen::Quaterniond q(table.Column(kQuatW)[i],
+                             table.Column(kQuatX)[i],
+                             table.Column(kQuatY)[i],
+                             table.Column(kQuatZ)[i]);
+  const auto radius = [&](Parameter scale) {
+    return std::min(kSigmas * std::exp(static_cast<double>(table.Column(scale)[i])), kMaxRadiusM);
+  };
+  const Eigen::Vector3d mean(
+      table.Column(kMeanX)[i], table.Column(kMeanY)[i], table.Column(kMeanZ)[i]);
+  return {mean, q.normalized().toRotationMatrix(), radius(kLogScaleU), radius(kLogScaleV)};
+}
+
 std::size_t DropBroken(SurfelMap& map) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < map.Size(); ++i) {

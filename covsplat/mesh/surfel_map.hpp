@@ -18,6 +18,16 @@ struct SurfelMap {
   std::size_t Size() const { return gaussians.Size(); }
 };
 
+/// What a Gaussian covers, in the map frame: a flat ellipse of two standard deviations.
+struct SurfelDisc {
+  Eigen::Vector3d mean;
+  Eigen::Matrix3d axes;  ///< columns: along the radii, and the normal
+  double radius_u = 0.0;
+  double radius_v = 0.0;
+};
+
+SurfelDisc DiscOf(const SurfelMap& map, std::size_t i);
+
 /// Removes Gaussians with a number that is not finite or a rotation of no length; returns how many.
 std::size_t DropBroken(SurfelMap& map);
 

@@ -8,8 +8,6 @@ namespace {
 
 /// Vertices of the surface are numbered by 20 bits per axis; some are left for neighbours.
 constexpr double kMaxVoxelIndex = (1 << 19) - 4 * kBlockSide;
-constexpr double kSigmas = 2.0;
-constexpr double kMaxRadiusM = 5.0;  // of a disc; maps have none that large
 constexpr std::size_t kSurfelsPerTask = 1024;
 
 void SortUnique(std::vector<BlockIndex>& blocks) {
@@ -17,34 +15,8 @@ void SortUnique(std::vector<BlockIndex>& blocks) {
   blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
 }
 
-Eigen::Vector3d MeanOf(const SurfelMap& map, std::size_t i) {
-  return {map.gaussians.Column(kMeanX)[i],
-          map.gaussians.Column(kMeanY)[i],
-          map.gaussians.Column(kMeanZ)[i]};
-}
-
-/// A disc in its own frame.
-struct Disc {
-  Eigen::Vector3d mean;
-  Eigen::Matrix3d axes;
-  double radius_u, radius_v;
-};
-
-Disc DiscOf(const SurfelMap& map, std::size_t i) {
-  const GaussianColumns<float>& table = map.gaussians;
-  const Eigen::Quaterniond q(table.Column(kQuatW)[i],
-                             table.Column(kQuatX)[i],
-                             table.Column(kQuatY)[i],
-                             table.Column(kQuatZ)[i]);
-  const auto radius = [&](Parameter scale) {
-    return std::min(kSigmas * std::exp(static_cast<double>(table.Column(scale)[i])), kMaxRadiusM);
-  };
-  return {
-      MeanOf(map, i), q.normalized().toRotationMatrix(), radius(kLogScaleU), radius(kLogScaleV)};
-}
-
 /// Blocks that the disc's points, half a block apart, have within the margin.
-void AppendBlocks(const Disc& disc,
+void AppendBlocks(const SurfelDisc& disc,
                   double block_m,
                   double margin_m,
                   std::vector<BlockIndex>& blocks) {
@@ -71,7 +43,7 @@ void AppendBlocks(const Disc& disc,
 Result<void> CheckExtent(const SurfelMap& map, double voxel_m) {
   double farthest = 0.0;
   for (std::size_t i = 0; i < map.Size(); ++i) {
-    farthest = std::max(farthest, MeanOf(map, i).cwiseAbs().maxCoeff());
+    farthest = std::max(farthest, DiscOf(map, i).mean.cwiseAbs().maxCoeff());
   }
   if (farthest / voxel_m < kMaxVoxelIndex) return {};
   return Fail(ErrorCode::kUsage,

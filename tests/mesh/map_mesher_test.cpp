@@ -172,6 +172,24 @@ TEST(MapMesher, WhatOnlyOneViewShowsInFreeSpaceIsCarvedAway) {
   EXPECT_EQ(ghosts, 0);
 }
 
+TEST(MapMesher, WhatNoViewShowsWellIsKnownFromItsGaussians) {
+  // A wall that the only view may not look as far as.
+  std::vector<Disc> discs;
+  Tile(Vector(5.0, 0.0, 0.0), Vector(0.0, 0.0, 1.0), Vector(0.0, 1.0, 0.0), discs);
+  const SurfelMap map = MapOf(discs, {At(0.0, 0.0, 0.0)});
+  MeshConfig config = Config();
+  config.view.max_range_m = 3.0;
+  const Result<MeshResult> known = Mesh(map, config);
+  ASSERT_TRUE(known) << known.error().message;
+  ASSERT_GT(known->mesh.vertices.size(), 500u);
+  for (std::size_t i = 0; i < known->mesh.vertices.size(); ++i) {
+    EXPECT_NEAR(known->mesh.vertices[i].x(), 5.0f, 0.1f * static_cast<float>(kVoxel));
+    EXPECT_LT(known->mesh.normals[i].x(), -0.9f);
+  }
+  config.surfel_weight = 0.0;
+  EXPECT_FALSE(Mesh(map, config));
+}
+
 TEST(MapMesher, FarFromTheOriginIsAsAccurateAsNear) {
   std::vector<Disc> discs = Room();
   const Vector far(900.0, -700.0, 30.0);
