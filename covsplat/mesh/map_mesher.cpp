@@ -22,7 +22,7 @@ EngineConfig EngineFor(const RasterConfig& raster) {
 
 /// Whether a view can see into a tile.
 bool Reaches(const SE3& T_map_view, const Tile& tile, double block_m, double max_range_m) {
-  const Eigen::Vector3d here = T_map_view.Translation();
+  const Eigen::Vector3d& here = T_map_view.Translation();
   return std::any_of(tile.padded.begin(), tile.padded.end(), [&](const BlockIndex& block) {
     const Eigen::Vector3d low = block_m * block.cast<double>();
     const Eigen::Vector3d nearest =
