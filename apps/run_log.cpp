@@ -89,6 +89,7 @@ Result<void> RunLog::Append(const ScanRecord& record, std::int64_t rss_bytes) {
 
 // In one piece, so that a killed run does not end in the middle of a gap.
 Result<void> RunLog::FillGap(std::int64_t rows, const TimedPose& next) {
+  if (rows <= 0) return {};
   std::string tum;
   std::string kitti;
   for (std::int64_t i = 1; i <= rows; ++i) {

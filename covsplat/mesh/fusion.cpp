@@ -7,7 +7,6 @@ namespace covsplat {
 namespace {
 
 /// Of the truncation; at 3 voxels a wall of 2 does not thicken.
-constexpr float kBehindShare = 2.0f / 3.0f;
 
 /// What a view has to say to every voxel of the field.
 struct FusionJob {
@@ -97,7 +96,7 @@ void FuseView(const ViewCamera& camera,
   job.R_map_view = view.T_map_view.RotationMatrix().cast<float>();
   job.voxel_m = static_cast<float>(grid.VoxelSize());
   job.truncation_m = static_cast<float>(config.truncation_voxels * grid.VoxelSize());
-  job.behind_m = kBehindShare * job.truncation_m;
+  job.behind_m = static_cast<float>(kBehindShare) * job.truncation_m;
   job.max_range_m = static_cast<float>(config.view.max_range_m);
   ParallelFor(pool, grid.Size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) FuseBlock(job, grid.Block(i), grid.Voxels(i));

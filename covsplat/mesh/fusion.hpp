@@ -6,6 +6,9 @@
 
 namespace covsplat {
 
+/// How deep behind a surface a distance still counts, as a share of the truncation.
+inline constexpr double kBehindShare = 2.0 / 3.0;
+
 /// Adds a view to every block it sees: each voxel gathers the plane of the pixel that it falls on,
 /// so blocks are independent and the sums come out the same for any number of threads and any
 /// choice of blocks. Voxels in front of a surface are free, those behind it by more than the

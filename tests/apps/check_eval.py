@@ -10,14 +10,9 @@ import subprocess
 import sys
 import tempfile
 
-LIMIT_S = 600  # of one call, for machines and builds that are slow
-CASES = []
+from cases import LIMIT_S, binary, case, expect, run_cases
+
 ROOM_M = 4.0  # half the side of the room that is scanned
-
-
-def case(function):
-    CASES.append(function)
-    return function
 
 
 class Bench:
@@ -36,13 +31,6 @@ class Bench:
         call = self.call("map", result, truth, "--voxel", "0.05", "--json", "--quiet", *arguments)
         expect(call, 0)
         return json.loads(call.stdout), call.stderr
-
-
-def expect(call, code, out="", err=""):
-    said = f"stdout: {call.stdout}\nstderr: {call.stderr}"
-    assert call.returncode == code, f"exit code {call.returncode} instead of {code}\n{said}"
-    assert out in call.stdout, f"{out!r} is not in stdout\n{said}"
-    assert err in call.stderr, f"{err!r} is not in stderr\n{said}"
 
 
 def near(actual, expected, tolerance):
@@ -286,21 +274,13 @@ def trajectories_of_other_data_sets_are_read(bench):
     expect(bench.call("traj", "none.txt", "t.txt"), 3, err="none.txt: holds no poses")
 
 
+def in_a_fresh_folder(check):
+    with tempfile.TemporaryDirectory() as folder:
+        check(Bench(binary(), folder))
+
+
 def main() -> int:
-    binary = str(pathlib.Path(sys.argv[1]).resolve())
-    wanted = sys.argv[2:]
-    failed = 0
-    for check in CASES:
-        if wanted and check.__name__ not in wanted:
-            continue
-        with tempfile.TemporaryDirectory() as folder:
-            try:
-                check(Bench(binary, folder))
-                print(f"ok      {check.__name__}", flush=True)
-            except (AssertionError, OSError, subprocess.TimeoutExpired, KeyError) as error:
-                failed += 1
-                print(f"FAILED  {check.__name__}: {error!r}", flush=True)
-    return 1 if failed else 0
+    return run_cases(in_a_fresh_folder)
 
 
 if __name__ == "__main__":

@@ -13,17 +13,12 @@ import sys
 import tempfile
 import time
 
+from cases import LIMIT_S, binary, case, expect, run_cases
+
 SCANS = 12
-LIMIT_S = 600  # of one call, for machines and builds that are slow
 SMALL = ["-s", "lidar.rows=32", "-s", "lidar.columns=256"]
 FILES = ["config.yaml", "frames.csv", "keyframes_tum.txt", "map.ply", "metrics.json", "report.html",
          "trajectory_kitti.txt", "trajectory_tum.txt"]
-CASES = []
-
-
-def case(function):
-    CASES.append(function)
-    return function
 
 
 class Bench:
@@ -53,13 +48,6 @@ class Bench:
 
     def scan(self, recording, index):
         return recording / "velodyne" / f"{index:06}.bin"
-
-
-def expect(call, code, out="", err=""):
-    said = f"stdout: {call.stdout}\nstderr: {call.stderr}"
-    assert call.returncode == code, f"exit code {call.returncode} instead of {code}\n{said}"
-    assert out in call.stdout, f"{out!r} is not in stdout\n{said}"
-    assert err in call.stderr, f"{err!r} is not in stderr\n{said}"
 
 
 def poses(folder):
@@ -438,21 +426,9 @@ def the_demo_runs(bench):
 
 
 def main() -> int:
-    binary = str(pathlib.Path(sys.argv[1]).resolve())
-    wanted = sys.argv[2:]
-    failed = 0
     with tempfile.TemporaryDirectory() as folder:
-        bench = Bench(binary, folder)
-        for check in CASES:
-            if wanted and check.__name__ not in wanted:
-                continue
-            try:
-                check(bench)
-                print(f"ok      {check.__name__}", flush=True)
-            except (AssertionError, OSError, subprocess.TimeoutExpired, KeyError) as error:
-                failed += 1
-                print(f"FAILED  {check.__name__}: {error!r}", flush=True)
-    return 1 if failed else 0
+        bench = Bench(binary(), folder)
+        return run_cases(lambda check: check(bench))
 
 
 if __name__ == "__main__":
