@@ -20,8 +20,8 @@ struct FinishedRun {
   std::size_t broken = 0;  ///< Gaussians that were left out because they are not finite
 };
 
-/// Reads config.yaml, trajectory_tum.txt, keyframes_tum.txt and map.ply. Errors name the file that is
-/// missing, damaged or does not belong to the others, and what to do.
+/// Reads config.yaml, trajectory_tum.txt, keyframes_tum.txt and map.ply. Errors name the file that
+/// is missing, damaged or does not belong to the others, and what to do.
 Result<FinishedRun> ReadRun(const std::filesystem::path& folder);
 
 }  // namespace covsplat

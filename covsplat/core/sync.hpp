@@ -95,10 +95,11 @@ class Latest {
     return value_;
   }
 
-  /// Waits until there is a value.
-  void WaitForFirst() const {
+  /// Waits until there is a value for which good(value) holds.
+  template <class Good>
+  void WaitFor(Good&& good) const {
     std::unique_lock lock(mutex_);
-    published_.wait(lock, [&] { return value_ != nullptr; });
+    published_.wait(lock, [&] { return value_ != nullptr && good(*value_); });
   }
 
  private:

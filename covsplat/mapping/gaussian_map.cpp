@@ -24,7 +24,9 @@ void Gather(std::vector<T>& column, const std::vector<std::size_t>& old_row) {
 void GaussianSignals::Resize(std::size_t size) {
   confidence.resize(size, 0.0f);
   control_score.resize(size, std::numeric_limits<float>::quiet_NaN());
+  density.resize(size, 0.0f);
   last_seen.resize(size, -1);
+  seen_through.resize(size, 0);
   trackable.resize(size, 0);
 }
 
@@ -42,6 +44,7 @@ int GaussianMap::AddKeyframe(const Keyframe& keyframe, const SpawnedGaussians& s
   for (std::size_t i = range.begin; i < range.end; ++i) {
     signals_.confidence[i] = spawned.confidence[i - range.begin];
     signals_.control_score[i] = spawned.control_score[i - range.begin];
+    if (!spawned.density.empty()) signals_.density[i] = spawned.density[i - range.begin];
     signals_.last_seen[i] = number;
     signals_.trackable[i] = 1;
   }
@@ -68,21 +71,22 @@ void GaussianMap::MarkSeen(int keyframe_number,
       const float tolerance = kSeenToleranceM + kSeenToleranceRatio * measured;
       if (measured > 0.0f && std::abs(measured - p.norm()) < tolerance) {
         signals_.last_seen[i] = keyframe_number;
+        signals_.seen_through[i] = 0;
+      } else if (SeesThrough(keyframe, sensor, p)) {
+        ++signals_.seen_through[i];
       }
     }
   }
 }
 
-std::size_t GaussianMap::PruneOpacity(double min_opacity) {
-  const auto min_logit = static_cast<float>(std::log(min_opacity / (1.0 - min_opacity)));
-  const GaussianColumns<float>& table = engine_->Gaussians();
-  std::vector<std::uint8_t> keep(table.Size(), 0);
+/// Removes the rows that f(row) names; returns how many.
+template <class F>
+std::size_t GaussianMap::RemoveIf(F&& f) {
+  std::vector<std::uint8_t> keep(engine_->Gaussians().Size(), 0);
   std::size_t removed = 0;
   for (const AnchorRange& range : engine_->Ranges()) {
     for (std::size_t i = range.begin; i < range.end; ++i) {
-      bool finite = true;
-      for (int p = 0; p < kParameterCount; ++p) finite &= std::isfinite(table.Column(p)[i]);
-      keep[i] = finite && table.Column(kOpacityLogit)[i] >= min_logit;
+      keep[i] = f(i) ? 0 : 1;
       removed += keep[i] == 0;
     }
   }
@@ -90,16 +94,32 @@ std::size_t GaussianMap::PruneOpacity(double min_opacity) {
   const std::vector<std::size_t> old_row = engine_->Keep(keep);
   Gather(signals_.confidence, old_row);
   Gather(signals_.control_score, old_row);
+  Gather(signals_.density, old_row);
   Gather(signals_.last_seen, old_row);
+  Gather(signals_.seen_through, old_row);
   Gather(signals_.trackable, old_row);
   for (std::size_t i = 0; i < old_row.size(); ++i) as_spawned_.MoveRow(old_row[i], i);
   as_spawned_.Resize(old_row.size());
   return removed;
 }
 
-std::vector<Eigen::Vector3f> GaussianMap::MeansNear(const SE3& T_map_sensor,
-                                                    double distance_m) const {
-  std::vector<Eigen::Vector3f> means;
+std::size_t GaussianMap::PruneOpacity(double min_opacity) {
+  const auto min_logit = static_cast<float>(std::log(min_opacity / (1.0 - min_opacity)));
+  const GaussianColumns<float>& table = engine_->Gaussians();
+  return RemoveIf([&](std::size_t i) {
+    bool finite = true;
+    for (int p = 0; p < kParameterCount; ++p) finite &= std::isfinite(table.Column(p)[i]);
+    return !finite || table.Column(kOpacityLogit)[i] < min_logit;
+  });
+}
+
+std::size_t GaussianMap::PruneSeenThrough(int keyframes) {
+  return RemoveIf([&](std::size_t i) { return signals_.seen_through[i] >= keyframes; });
+}
+
+/// Calls f(row, R_sensor_anchor, mean in the sensor's frame) for every Gaussian near a pose.
+template <class F>
+void GaussianMap::ForNear(const SE3& T_map_sensor, double distance_m, F&& f) const {
   const GaussianColumns<float>& table = engine_->Gaussians();
   const auto limit = static_cast<float>(distance_m * distance_m);
   for (const AnchorRange& range : engine_->Ranges()) {
@@ -111,10 +131,40 @@ std::vector<Eigen::Vector3f> GaussianMap::MeansNear(const SE3& T_map_sensor,
       const Eigen::Vector3f mean(
           table.Column(kMeanX)[i], table.Column(kMeanY)[i], table.Column(kMeanZ)[i]);
       const Eigen::Vector3f p = rotation * mean + translation;
-      if (p.squaredNorm() < limit) means.push_back(p);
+      if (p.squaredNorm() < limit) f(i, rotation, p);
     }
   }
-  return means;
+}
+
+std::vector<Disc> GaussianMap::DiscsNear(const SE3& T_map_sensor, double distance_m) const {
+  std::vector<Disc> discs;
+  const GaussianColumns<float>& table = engine_->Gaussians();
+  ForNear(T_map_sensor,
+          distance_m,
+          [&](std::size_t i, const Eigen::Matrix3f& rotation, const Eigen::Vector3f& mean) {
+            const Eigen::Matrix3f axes = rotation * Eigen::Quaternionf(table.Column(kQuatW)[i],
+                                                                       table.Column(kQuatX)[i],
+                                                                       table.Column(kQuatY)[i],
+                                                                       table.Column(kQuatZ)[i])
+                                                        .normalized()
+                                                        .toRotationMatrix();
+            discs.push_back({mean,
+                             std::exp(table.Column(kLogScaleU)[i]) * axes.col(0),
+                             std::exp(table.Column(kLogScaleV)[i]) * axes.col(1),
+                             signals_.density[i]});
+          });
+  return discs;
+}
+
+std::size_t GaussianMap::Replace(const SE3& T_map_sensor,
+                                 double distance_m,
+                                 std::span<const std::uint8_t> replaced) {
+  std::vector<std::uint8_t> goes(engine_->Gaussians().Size(), 0);
+  std::size_t next = 0;
+  ForNear(T_map_sensor, distance_m, [&](std::size_t i, const auto&, const auto&) {
+    goes[i] = replaced[next++];
+  });
+  return RemoveIf([&](std::size_t i) { return goes[i] != 0; });
 }
 
 std::size_t GaussianMap::Size() const {

@@ -11,7 +11,9 @@ namespace covsplat {
 struct GaussianSignals {
   std::vector<float> confidence;        ///< u
   std::vector<float> control_score;     ///< c, NaN where unknown
+  std::vector<float> density;           ///< measurements per m2 it was made of, 0: of one
   std::vector<int> last_seen;           ///< keyframe whose scan last agreed with the Gaussian (k_i)
+  std::vector<int> seen_through;        ///< keyframes since then that measured beyond it
   std::vector<std::uint8_t> trackable;  ///< m_i
 
   void Resize(std::size_t size);
@@ -26,14 +28,21 @@ class GaussianMap {
   /// keyframe's number.
   int AddKeyframe(const Keyframe& keyframe, const SpawnedGaussians& spawned);
 
-  /// Updates `last_seen` of all Gaussians that a keyframe's range image shows where they are.
+  /// Updates `last_seen` of all Gaussians that a keyframe's range image shows where they are, and
+  /// `seen_through` of those where it shows something beyond.
   void MarkSeen(int keyframe_number, const Keyframe& keyframe, const SensorModel& sensor);
 
   /// Removes Gaussians below an opacity (or no longer finite); returns how many went.
   std::size_t PruneOpacity(double min_opacity);
+  /// Removes Gaussians that so many keyframes have seen through: what they show has moved on.
+  std::size_t PruneSeenThrough(int keyframes);
 
-  /// Means within a distance of a pose, in its frame.
-  std::vector<Eigen::Vector3f> MeansNear(const SE3& T_map_sensor, double distance_m) const;
+  /// Gaussians whose means are within a distance of a pose, in its frame.
+  std::vector<Disc> DiscsNear(const SE3& T_map_sensor, double distance_m) const;
+  /// Removes those of the Gaussians that the same call of DiscsNear lists; returns how many went.
+  std::size_t Replace(const SE3& T_map_sensor,
+                      double distance_m,
+                      std::span<const std::uint8_t> replaced);
 
   /// Gaussians in the map, padding not counted.
   std::size_t Size() const;
@@ -49,6 +58,11 @@ class GaussianMap {
   const GaussianColumns<float>& AsSpawned() const { return as_spawned_; }
 
  private:
+  template <class F>
+  void ForNear(const SE3& T_map_sensor, double distance_m, F&& f) const;
+  template <class F>
+  std::size_t RemoveIf(F&& f);
+
   std::unique_ptr<SplatEngine> engine_;
   GaussianSignals signals_;
   GaussianColumns<float> as_spawned_;

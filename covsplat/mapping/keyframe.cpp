@@ -1,12 +1,20 @@
 #include "covsplat/mapping/keyframe.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "covsplat/mapping/signals.hpp"
 #include "covsplat/registration/nearest_index.hpp"
 
 namespace covsplat {
+namespace {
+
+/// So far beyond a place, and so much of its range more, a measurement has seen through it.
+constexpr float kBeyondM = 0.3f;
+constexpr float kBeyondRatio = 0.03f;
+
+}  // namespace
 
 double Overlap(std::span<const float> squared_distance, double overlap_distance_m) {
   if (squared_distance.empty()) return 0.0;
@@ -47,6 +55,26 @@ Keyframe MakeKeyframe(TrackedScan tracked,
     }
   });
   return keyframe;
+}
+
+bool SeesThrough(const Keyframe& keyframe,
+                 const SensorModel& sensor,
+                 const Eigen::Vector3f& place) {
+  const std::optional<Pixel> pixel = sensor.Project(place);
+  if (!pixel) return false;
+  const Image<float>& measured = keyframe.measurement.range_m;
+  const float beyond_m = kBeyondM + (1.0f + kBeyondRatio) * place.norm();
+  const int last_row = std::min(pixel->row + 1, measured.Rows() - 1);
+  bool measures = false;
+  for (int row = std::max(pixel->row - 1, 0); row <= last_row; ++row) {
+    for (int k = -1; k <= 1; ++k) {
+      const int column = (pixel->column + k + measured.Columns()) % measured.Columns();
+      if (measured(row, column) <= 0.0f) continue;
+      if (measured(row, column) < beyond_m) return false;
+      measures = true;
+    }
+  }
+  return measures;
 }
 
 }  // namespace covsplat

@@ -7,6 +7,7 @@
 
 #include "covsplat/core/config_field.hpp"
 #include "covsplat/core/range_image.hpp"
+#include "covsplat/mapping/patches.hpp"
 #include "covsplat/registration/preprocess.hpp"
 #include "covsplat/splat/engine.hpp"
 
@@ -22,6 +23,7 @@ struct TrackedScan {
   std::vector<Eigen::Vector3f> surface;     ///< [S] deskewed source points of the registration, m
   std::vector<PointCovariance> covariance;  ///< [S] the surface around each
   std::vector<float> squared_distance;      ///< [S] m^2 to the target, infinity where unmatched
+  std::vector<PosedPoints> sweep;           ///< of a keyframe: the scans since the one before
 };
 
 /// A tracked scan on the sensor's image grid, with the surface each pixel lies on.
@@ -37,7 +39,8 @@ struct KeyframeConfig {
   double max_distance_m = 2.0;
   double max_angle_deg = 20.0;
   double min_overlap = 0.8;
-  double overlap_distance_m = 0.3;
+  double wait_overlap = 0.6;
+  double overlap_distance_m = 0.6;
   int max_scans = 20;
 
   template <class Self, class V>
@@ -49,6 +52,10 @@ struct KeyframeConfig {
             c.min_overlap,
             Range{0.0, 1.0},
             "... or when less than this share of the scan is near the map");
+    v.Field("wait_overlap",
+            c.wait_overlap,
+            Range{0.0, 1.0},
+            "... and below this share tracking waits for the keyframes on their way to the map");
     v.Field("overlap_distance_m",
             c.overlap_distance_m,
             Range{0.01, 10.0},
@@ -66,5 +73,9 @@ Keyframe MakeKeyframe(TrackedScan tracked,
                       const SensorModel& sensor,
                       double max_surface_distance_m,
                       ThreadPool& pool);
+
+/// Whether the keyframe measured beyond a place (sensor frame) and nothing near it in the pixels
+/// around: what was there has moved on.
+bool SeesThrough(const Keyframe& keyframe, const SensorModel& sensor, const Eigen::Vector3f& place);
 
 }  // namespace covsplat

@@ -12,21 +12,26 @@ constexpr std::size_t kNearKeyframes = 8;
 
 Mapper::Mapper(std::unique_ptr<SplatEngine> engine,
                const SensorModel& sensor,
-               const MapperConfig& config)
-    : sensor_(sensor), config_(config), map_(std::move(engine)) {}
+               const MapperConfig& config,
+               ThreadPool& pool)
+    : sensor_(sensor), config_(config), pool_(pool), map_(std::move(engine)) {}
 
 void Mapper::Insert(const Keyframe& keyframe) {
   const ScopedTimer timer(times_, "insert");
   const SE3& T_map_sensor = keyframe.tracked.T_map_sensor;
   std::optional<RenderOutput> render;
   if (map_.Keyframes() > 0) render = Render(T_map_sensor);
+  const double reach_m = sensor_.MaxRange();
   const SpawnedGaussians spawned = SpawnGaussians(keyframe,
                                                   render ? &*render : nullptr,
-                                                  map_.MeansNear(T_map_sensor, sensor_.MaxRange()),
+                                                  map_.DiscsNear(T_map_sensor, reach_m),
                                                   sensor_,
-                                                  config_.spawn);
+                                                  config_.spawn,
+                                                  pool_);
+  if (!spawned.replaced.empty()) map_.Replace(T_map_sensor, reach_m, spawned.replaced);
   const int number = map_.AddKeyframe(keyframe, spawned);
   map_.MarkSeen(number, keyframe, sensor_);
+  map_.PruneSeenThrough(config_.prune_seen_through);
   if (map_.Keyframes() % config_.prune_interval == 0) map_.PruneOpacity(config_.prune_opacity);
 }
 
@@ -73,6 +78,7 @@ void Mapper::OptimizeFinally() {
 int Mapper::RandomNearKeyframe() {
   const Eigen::Vector3d here = map_.KeyframePose(map_.Keyframes() - 1).Translation();
   std::vector<std::pair<double, int>> by_distance;
+  by_distance.reserve(static_cast<std::size_t>(map_.Keyframes()));
   for (int k = 0; k < map_.Keyframes(); ++k) {
     by_distance.emplace_back((map_.KeyframePose(k).Translation() - here).norm(), k);
   }

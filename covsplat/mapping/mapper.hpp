@@ -46,6 +46,7 @@ struct MapperConfig {
   ScheduleConfig schedule;
   EngineConfig engine;
   double prune_opacity = 0.05;
+  int prune_seen_through = 2;
   int prune_interval = 5;
 
   template <class Self, class V>
@@ -61,6 +62,10 @@ struct MapperConfig {
             c.prune_opacity,
             Range{0.0, 0.9},
             "Gaussians that have become more transparent than this are removed");
+    v.Field("prune_seen_through",
+            c.prune_seen_through,
+            Range{1, 1000000},
+            "so are Gaussians that so many keyframes in a row have seen through");
     v.Field("prune_interval", c.prune_interval, Range{1, 100000}, "keyframes between prunings");
   }
 };
@@ -69,7 +74,8 @@ class Mapper {
  public:
   Mapper(std::unique_ptr<SplatEngine> engine,
          const SensorModel& sensor,
-         const MapperConfig& config);
+         const MapperConfig& config,
+         ThreadPool& pool);
 
   /// Spawns Gaussians where the map does not explain the keyframe and makes it a training view.
   void Insert(const Keyframe& keyframe);
@@ -100,6 +106,7 @@ class Mapper {
 
   const SensorModel sensor_;
   const MapperConfig config_;
+  ThreadPool& pool_;
   GaussianMap map_;
   Rng rng_{20250711};
   std::int64_t steps_ = 0;

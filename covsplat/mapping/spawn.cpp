@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include "covsplat/registration/voxel_hash.hpp"
 
@@ -33,15 +34,25 @@ bool IsExplained(const Keyframe& keyframe,
          std::abs(rendered - measured) <= tolerance;
 }
 
-/// Unexplained pixels on a known surface, at most one per voxel that is still empty.
+/// Foliage, edges and points in mid-air make poor discs: they are left to patches.
+bool IsFlat(const PointCovariance& covariance) {
+  constexpr float kMaxThicknessM = 0.05f;
+  constexpr float kMaxThicknessShare = 0.3f;
+  const Eigen::Vector3f& sigma = covariance.sigma_m;
+  return sigma[2] < kMaxThicknessM && sigma[2] < kMaxThicknessShare * sigma[1];
+}
+
+/// Unexplained pixels on a known surface that no patch has, at most one per voxel that is still
+/// empty. `has_patch`: of the keyframe's points, or empty.
 std::vector<Site> ChooseSites(const Keyframe& keyframe,
                               const RenderOutput* render,
-                              std::span<const Eigen::Vector3f> existing_sensor,
+                              std::span<const Disc> existing_sensor,
+                              std::span<const std::uint8_t> has_patch,
                               const SpawnConfig& config) {
   const auto cells_per_m = static_cast<float>(1.0 / config.voxel_m);
   VoxelHash taken(keyframe.point.Size() + existing_sensor.size());
-  for (const Eigen::Vector3f& mean : existing_sensor) {
-    taken.FindOrInsert(CellOf(cells_per_m * mean), kOccupied);
+  for (const Disc& disc : existing_sensor) {
+    taken.FindOrInsert(CellOf(cells_per_m * disc.mean), kOccupied);
   }
   std::vector<Site> sites;
   for (int row = 0; row < keyframe.point.Rows(); ++row) {
@@ -49,6 +60,10 @@ std::vector<Site> ChooseSites(const Keyframe& keyframe,
       if (keyframe.surface(row, column) < 0) continue;
       if (IsExplained(keyframe, render, {row, column}, config)) continue;
       const auto point = static_cast<std::size_t>(keyframe.point(row, column));
+      if (!has_patch.empty()) {
+        const auto surface = static_cast<std::size_t>(keyframe.surface(row, column));
+        if (has_patch[point] != 0 || !IsFlat(keyframe.tracked.covariance[surface])) continue;
+      }
       const Eigen::Vector3i cell = CellOf(cells_per_m * keyframe.tracked.points[point]);
       if (taken.Find(cell) >= 0) continue;
       taken.FindOrInsert(cell, kOccupied);
@@ -142,36 +157,100 @@ Eigen::Matrix3f FacingAxes(const Eigen::Matrix3f& axes, const Eigen::Vector3f& p
   return facing;
 }
 
+/// Appends one Gaussian with its signals.
+void Append(const Eigen::Vector3f& mean,
+            const Eigen::Matrix3f& axes,
+            const Eigen::Vector2d& scales,
+            float control_score,
+            float density,
+            const SpawnConfig& config,
+            SpawnedGaussians& spawned) {
+  const std::size_t i = spawned.gaussians.Size();
+  spawned.gaussians.Resize(i + 1);
+  const double range = mean.norm();
+  const double cosine = std::abs(axes.col(2).dot(mean.normalized()));
+  const double u = PhysicalConfidence(range, cosine, config.confidence);
+  // Paper eq. 8.
+  const double opacity = config.min_opacity + (config.max_opacity - config.min_opacity) * u;
+  WriteGaussian(spawned.gaussians, i, mean, axes, scales, opacity);
+  spawned.confidence.push_back(static_cast<float>(u));
+  spawned.control_score.push_back(control_score);
+  spawned.density.push_back(density);
+}
+
+/// Control score of the surface that the keyframe shows at a place, NaN where it shows none.
+float ControlScoreAt(const Keyframe& keyframe,
+                     const SensorModel& sensor,
+                     const Eigen::Vector3f& place) {
+  const std::optional<Pixel> pixel = sensor.Project(place);
+  const int surface = pixel ? keyframe.surface(pixel->row, pixel->column) : -1;
+  if (surface < 0) return std::numeric_limits<float>::quiet_NaN();
+  return keyframe.control_score[static_cast<std::size_t>(surface)];
+}
+
+void SpawnFromPatches(const Keyframe& keyframe,
+                      std::span<const Patch> patches,
+                      const SensorModel& sensor,
+                      const SpawnConfig& config,
+                      SpawnedGaussians& spawned) {
+  for (const Patch& patch : patches) {
+    if (SeesThrough(keyframe, sensor, patch.mean)) continue;
+    const Eigen::Vector2d scales =
+        (config.patches.extent_factor * patch.sigma_m.head<2>().cast<double>())
+            .cwiseMax(config.min_scale_m)
+            .cwiseMin(config.max_scale_m);
+    const float score = ControlScoreAt(keyframe, sensor, patch.mean);
+    Append(patch.mean, patch.axes, scales, score, patch.density, config, spawned);
+  }
+}
+
+void SpawnFromPixels(const Keyframe& keyframe,
+                     std::span<const Site> sites,
+                     const SensorModel& sensor,
+                     const SpawnConfig& config,
+                     SpawnedGaussians& spawned) {
+  for (const Site& site : sites) {
+    const auto surface = static_cast<std::size_t>(keyframe.surface(site.row, site.column));
+    const PointCovariance& covariance = keyframe.tracked.covariance[surface];
+    const Eigen::Vector3f mean = OnSurface(keyframe, site, covariance.axes.col(2), config);
+    const double range = mean.norm();
+    const double cosine = std::abs(covariance.axes.col(2).dot(mean.normalized()));
+    const double sampling_m = SamplingDistance(sensor, site.row, range, cosine);
+    Append(mean,
+           FacingAxes(covariance.axes, mean),
+           InitialScales(config, covariance.sigma_m, range, sampling_m),
+           keyframe.control_score[surface],
+           0.0f,
+           config,
+           spawned);
+  }
+}
+
+/// The keyframe's own points come last.
+std::vector<PosedPoints> WithSweep(const Keyframe& keyframe) {
+  std::vector<PosedPoints> scans = keyframe.tracked.sweep;
+  scans.push_back({keyframe.tracked.T_map_sensor, keyframe.tracked.points});
+  return scans;
+}
+
 }  // namespace
 
 SpawnedGaussians SpawnGaussians(const Keyframe& keyframe,
                                 const RenderOutput* render,
-                                std::span<const Eigen::Vector3f> existing_sensor,
+                                std::span<const Disc> existing_sensor,
                                 const SensorModel& sensor,
-                                const SpawnConfig& config) {
-  const std::vector<Site> sites = ChooseSites(keyframe, render, existing_sensor, config);
+                                const SpawnConfig& config,
+                                ThreadPool& pool) {
   SpawnedGaussians spawned;
-  spawned.gaussians.Resize(sites.size());
-  for (std::size_t i = 0; i < sites.size(); ++i) {
-    const auto [row, column] = sites[i];
-    const auto surface = static_cast<std::size_t>(keyframe.surface(row, column));
-    const PointCovariance& covariance = keyframe.tracked.covariance[surface];
-    const Eigen::Vector3f mean = OnSurface(keyframe, sites[i], covariance.axes.col(2), config);
-    const double range = mean.norm();
-    const double cosine = std::abs(covariance.axes.col(2).dot(mean.normalized()));
-    const double u = PhysicalConfidence(range, cosine, config.confidence);
-    // Paper eq. 8.
-    const double opacity = config.min_opacity + (config.max_opacity - config.min_opacity) * u;
-    const double sampling_m = SamplingDistance(sensor, row, range, cosine);
-    WriteGaussian(spawned.gaussians,
-                  i,
-                  mean,
-                  FacingAxes(covariance.axes, mean),
-                  InitialScales(config, covariance.sigma_m, range, sampling_m),
-                  opacity);
-    spawned.confidence.push_back(static_cast<float>(u));
-    spawned.control_score.push_back(keyframe.control_score[surface]);
+  PatchFit fit;
+  if (config.patches.enabled) {
+    fit = FitPatches(WithSweep(keyframe), existing_sensor, sensor, config.patches, pool);
+    spawned.replaced = std::move(fit.replaced);
+    SpawnFromPatches(keyframe, fit.patches, sensor, config, spawned);
   }
+  const std::vector<Site> sites =
+      ChooseSites(keyframe, render, existing_sensor, fit.has_patch, config);
+  SpawnFromPixels(keyframe, sites, sensor, config, spawned);
   return spawned;
 }
 

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "covsplat/mapping/keyframe.hpp"
+#include "covsplat/mapping/patches.hpp"
 #include "covsplat/mapping/signals.hpp"
 
 namespace covsplat {
@@ -33,8 +34,9 @@ struct SpawnConfig {
   double kappa = 0.1;
   double min_scale_m = 0.02;
   double max_scale_m = 0.5;
-  double min_opacity = 0.1;
+  double min_opacity = 0.4;
   double max_opacity = 0.9;
+  PatchConfig patches;
   ConfidenceConfig confidence;
 
   template <class Self, class V>
@@ -71,6 +73,7 @@ struct SpawnConfig {
     v.Field("max_scale_m", c.max_scale_m, Range{0.01, 10.0}, "s_max: largest initial scale");
     v.Field("min_opacity", c.min_opacity, Range{0.001, 0.999}, "initial opacity at confidence 0");
     v.Field("max_opacity", c.max_opacity, Range{0.001, 0.999}, "initial opacity at confidence 1");
+    v.Section("patches", c.patches, "planes through the scans since the last keyframe");
     v.Section("confidence", c.confidence, "physical confidence u");
   }
 };
@@ -80,15 +83,21 @@ struct SpawnedGaussians {
   GaussianColumns<float> gaussians;
   std::vector<float> confidence;     ///< [N] u
   std::vector<float> control_score;  ///< [N] c, NaN where unknown
+  std::vector<float> density;        ///< [N] measurements per m2, 0 of single pixels
+  /// [existing Gaussians] whether new ones replace it.
+  std::vector<std::uint8_t> replaced;
 };
 
-/// `render`: the map from the keyframe's pose; nothing for the first keyframe. `existing_sensor`:
-/// means of the map's Gaussians around it; a voxel that has one gets no second, however badly the
-/// pixel is explained (edges and foliage never are).
+/// Patches through all scans since the last keyframe where they lie dense enough; elsewhere the
+/// keyframe's own pixels with the covariances that tracking has of them. `render`: the map from the
+/// keyframe's pose; nothing for the first keyframe. `existing_sensor`: the map's Gaussians around
+/// it. Where a disc passes there is no second patch, and a voxel that has a mean gets no second
+/// pixel, however badly it is explained (edges and foliage never are).
 SpawnedGaussians SpawnGaussians(const Keyframe& keyframe,
                                 const RenderOutput* render,
-                                std::span<const Eigen::Vector3f> existing_sensor,
+                                std::span<const Disc> existing_sensor,
                                 const SensorModel& sensor,
-                                const SpawnConfig& config);
+                                const SpawnConfig& config,
+                                ThreadPool& pool);
 
 }  // namespace covsplat

@@ -6,8 +6,6 @@
 namespace covsplat {
 namespace {
 
-/// Of the truncation; at 3 voxels a wall of 2 does not thicken.
-
 /// What a view has to say to every voxel of the field.
 struct FusionJob {
   const ViewCamera* camera;

@@ -103,8 +103,8 @@ Result<MeshResult> MeshOfMap(const SurfelMap& map,
   DropSmallComponents(config.min_component_m2, result.mesh);
   if (result.mesh.triangles.empty()) {
     return Fail(ErrorCode::kInput,
-                "the map shows no surface from its keyframes; lower mesh.min_weight or "
-                "mesh.view.min_alpha if it is very sparse");
+                "the map shows no surface from its keyframes; lower min_weight or "
+                "view.min_alpha if it is very sparse");
   }
   return result;
 }

@@ -49,7 +49,7 @@ struct MeshConfig {
   double voxel_m = 0.0;
   double truncation_voxels = 3.0;
   double min_weight = 0.1;
-  double surfel_weight = 0.12;
+  double surfel_weight = 3.0;
   double sharpness = 0.9;
   double min_component_m2 = 0.1;
   int max_tile_blocks = 40000;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -63,6 +64,11 @@ std::vector<std::vector<Plane>> PlanesOfBlocks(const SurfelMap& map,
   return planes;
 }
 
+/// Where most views look through, a disc has nothing to say: what it shows has moved on.
+bool IsFree(const Voxel& voxel, float truncation_voxels) {
+  return voxel.distance > 0.7f * truncation_voxels * voxel.weight;
+}
+
 void AddPlane(const Plane& plane,
               const Eigen::Vector3d& position,
               const FusionJob& job,
@@ -81,9 +87,10 @@ void AddPlane(const Plane& plane,
   voxel.normal += share * plane.normal.cast<float>();
 }
 
-/// Adds a plane to the voxels of a block, which begins at voxel `first`.
+/// Adds a plane to the voxels of a block, which begins at voxel `first`, but for the free ones.
 void FuseIntoBlock(const Plane& plane,
                    const Eigen::Array3i& first,
+                   const std::vector<std::uint8_t>& is_free,
                    const FusionJob& job,
                    std::span<Voxel> voxels) {
   const Eigen::Array3i low = (plane.low - first).max(0);
@@ -92,10 +99,9 @@ void FuseIntoBlock(const Plane& plane,
     for (int y = low.y(); y <= high.y(); ++y) {
       for (int x = low.x(); x <= high.x(); ++x) {
         const Eigen::Array3i index = first + Eigen::Array3i(x, y, z);
-        AddPlane(plane,
-                 job.voxel_m * index.cast<double>().matrix(),
-                 job,
-                 voxels[static_cast<std::size_t>(VoxelInBlock(x, y, z))]);
+        const auto i = static_cast<std::size_t>(VoxelInBlock(x, y, z));
+        if (is_free[i] != 0) continue;
+        AddPlane(plane, job.voxel_m * index.cast<double>().matrix(), job, voxels[i]);
       }
     }
   }
@@ -114,7 +120,12 @@ void FuseSurfels(const SurfelMap& map,
   ParallelFor(pool, grid.Size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) {
       const Eigen::Array3i first = kBlockSide * grid.Block(b).array();
-      for (const Plane& plane : planes[b]) FuseIntoBlock(plane, first, job, grid.Voxels(b));
+      const std::span<Voxel> voxels = grid.Voxels(b);
+      std::vector<std::uint8_t> is_free(voxels.size());
+      for (std::size_t i = 0; i < voxels.size(); ++i) {
+        is_free[i] = IsFree(voxels[i], static_cast<float>(config.truncation_voxels)) ? 1 : 0;
+      }
+      for (const Plane& plane : planes[b]) FuseIntoBlock(plane, first, is_free, job, voxels);
     }
   });
 }

@@ -71,7 +71,7 @@ SlamSystem::SlamSystem(const SlamConfig& config,
       tracker_(config.tracker, *track_pool_),
       held_out_stride_(config.system.held_out_interval),
       next_held_out_(held_out_stride_),
-      mapper_(std::move(engine), sensor, config.mapper),
+      mapper_(std::move(engine), sensor, config.mapper, *map_pool_),
       keyframes_(kKeyframeQueue) {
   if (config_.system.schedule == Schedule::kThreaded) {
     mapper_thread_ = std::jthread([this] { MapperLoop(); });
@@ -95,8 +95,12 @@ std::optional<ScanRecord> SlamSystem::Process(const Scan& scan) {
   record.track_ms = elapsed.count();
   record.target_surfels = target ? target->Size() : 0;
   if (result->first) HandOver(std::move(*result->first), &record.times);
-  if (!result->is_keyframe) MaybeHoldOut(*result);
-  if (result->is_keyframe) HandOver(std::move(result->tracked), &record.times);
+  if (result->is_keyframe) {
+    HandOver(std::move(result->tracked), &record.times);
+  } else if (!MaybeHoldOut(*result)) {
+    AddToSweep(*result);
+  }
+  WaitForMap(record.overlap, record.times);
   record.gaussians = gaussians_;
   record.mapper_steps = mapper_steps_;
   ++scans_;
@@ -105,13 +109,25 @@ std::optional<ScanRecord> SlamSystem::Process(const Scan& scan) {
 
 void SlamSystem::HandOver(TrackedScan keyframe, StageTimes* times) {
   keyframe_scans_.push_back(keyframe.scan);
+  keyframe.sweep = std::exchange(sweep_, {});
   if (config_.system.schedule == Schedule::kLockstep) {
     MapKeyframe(std::move(keyframe), *times);
     return;
   }
   const ScopedTimer timer(*times, "wait");
   keyframes_.Push(std::move(keyframe));
-  target_.WaitForFirst();  // without any map there is nothing to track the next scan against
+  // Without any map there is nothing to track the next scan against.
+  target_.WaitFor([](const RegistrationTarget&) { return true; });
+}
+
+// A scan that has all but left the map is followed by one that is lost, unless the keyframes that
+// are on their way to the mapper are waited for.
+void SlamSystem::WaitForMap(double overlap, StageTimes& times) {
+  if (config_.system.schedule == Schedule::kLockstep || keyframe_scans_.empty()) return;
+  if (overlap >= config_.tracker.keyframe.wait_overlap) return;
+  const ScopedTimer timer(times, "wait");
+  const auto all = static_cast<int>(keyframe_scans_.size());
+  target_.WaitFor([&](const RegistrationTarget& target) { return target.Keyframes() >= all; });
 }
 
 // One keyframe's way through the mapper; the target is published as soon as it holds the keyframe,
@@ -157,19 +173,25 @@ void SlamSystem::MapperLoop() {
   }
 }
 
-void SlamSystem::MaybeHoldOut(const TrackResult& result) {
-  if (held_out_stride_ == 0 || result.state != TrackState::kTracking) return;
-  if (scans_ < next_held_out_) return;
+bool SlamSystem::MaybeHoldOut(const TrackResult& result) {
+  if (held_out_stride_ == 0 || result.state != TrackState::kTracking) return false;
+  if (scans_ < next_held_out_) return false;
   held_out_.push_back({result.tracked.scan,
                        result.tracked.T_map_sensor,
                        ProjectScan(sensor_, result.tracked.points).range_m});
   next_held_out_ = scans_ + held_out_stride_;
-  if (held_out_.size() < kMaxHeldOut) return;
+  if (held_out_.size() < kMaxHeldOut) return true;
   // Long runs: keep every other one and take half as many from now on.
   std::vector<HeldOut> thinned;
   for (std::size_t i = 0; i < held_out_.size(); i += 2) thinned.push_back(std::move(held_out_[i]));
   held_out_ = std::move(thinned);
   held_out_stride_ *= 2;
+  return true;
+}
+
+void SlamSystem::AddToSweep(TrackResult& result) {
+  if (!config_.mapper.spawn.patches.enabled || result.state != TrackState::kTracking) return;
+  sweep_.push_back({result.tracked.T_map_sensor, std::move(result.tracked.points)});
 }
 
 void SlamSystem::Finish() {

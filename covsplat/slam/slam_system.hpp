@@ -77,10 +77,12 @@ class SlamSystem {
              std::unique_ptr<SplatEngine> engine);
 
   void HandOver(TrackedScan keyframe, StageTimes* times);
+  void WaitForMap(double overlap, StageTimes& times);
   void MapKeyframe(TrackedScan keyframe, StageTimes& times);
   void MapperLoop();
   void PublishTarget();
-  void MaybeHoldOut(const TrackResult& result);
+  bool MaybeHoldOut(const TrackResult& result);
+  void AddToSweep(TrackResult& result);
 
   // Constant after construction.
   const SlamConfig config_;
@@ -92,6 +94,7 @@ class SlamSystem {
   Tracker tracker_;
   std::optional<Trajectory> given_poses_;
   std::vector<HeldOut> held_out_;
+  std::vector<PosedPoints> sweep_;  ///< scans since the last keyframe
   std::vector<std::int64_t> keyframe_scans_;
   std::int64_t scans_ = 0;
   int held_out_stride_;

@@ -93,8 +93,8 @@ struct LossConfig {
 /// Adam with one second moment per vector, so that updates do not depend on the anchor's axes.
 struct OptimizerConfig {
   double mean_step_m = 2e-5;
-  double rotation_step_rad = 1e-3;
-  double log_scale_step = 2e-2;
+  double rotation_step_rad = 3e-4;
+  double log_scale_step = 5e-3;
   double opacity_logit_step = 5e-2;
   double beta1 = 0.9;
   double beta2 = 0.999;

@@ -36,5 +36,14 @@ TEST(Latest, ReadersSeeTheNewestValueAndKeepTheirs) {
   EXPECT_EQ(*latest.Get(), 2);
 }
 
+TEST(Latest, CanBeWaitedForUntilItIsGoodEnough) {
+  Latest<int> latest;
+  std::jthread writer([&] {
+    for (int i = 0; i <= 100; ++i) latest.Publish(std::make_shared<const int>(i));
+  });
+  latest.WaitFor([](int value) { return value >= 100; });
+  EXPECT_EQ(*latest.Get(), 100);
+}
+
 }  // namespace
 }  // namespace covsplat

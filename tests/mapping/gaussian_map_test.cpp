@@ -152,14 +152,27 @@ TEST_F(GaussianMapTest, MarksAsSeenOnlyWhatAKeyframeMeasuresInItsPlace) {
   EXPECT_EQ(LastSeen(3), 0);
 }
 
-TEST_F(GaussianMapTest, FindsMeansAroundAPoseInItsFrame) {
+TEST_F(GaussianMapTest, PrunesWhatKeyframesInARowSeeThrough) {
+  map_.AddKeyframe(Sphere(SE3(), 5.0f), GaussiansAt({{5, 0, 0}, {3, 0, 0}, {6, 0, 0}}));
+  map_.MarkSeen(0, Sphere(SE3(), 5.0f), sensor_);  // the second is in front, the third behind
+  EXPECT_EQ(map_.PruneSeenThrough(2), 0u);
+  map_.MarkSeen(0, Sphere(SE3(), 3.0f), sensor_);  // now it is where it was: it counts anew
+  map_.MarkSeen(0, Sphere(SE3(), 5.0f), sensor_);
+  EXPECT_EQ(map_.PruneSeenThrough(2), 0u);
+  map_.MarkSeen(0, Sphere(SE3(), 5.0f), sensor_);
+  EXPECT_EQ(map_.PruneSeenThrough(2), 1u);
+  EXPECT_EQ(map_.Size(), 2u);
+}
+
+TEST_F(GaussianMapTest, FindsDiscsAroundAPoseInItsFrame) {
   const SE3 keyframe = MakePose(0, 0, 0.5, 1000, -400, 1);
   map_.AddKeyframe(Sphere(keyframe, 5.0f), GaussiansAt({{5, 0, 0}, {0, 15, 0}}));
   const SE3 pose = keyframe * MakePose(0, 0, std::numbers::pi, 1, 0, 0);
-  const std::vector<Eigen::Vector3f> means = map_.MeansNear(pose, 10.0);
-  ASSERT_EQ(means.size(), 1u);  // no padding, nothing from farther away
-  EXPECT_LT((means[0] - Eigen::Vector3f(-4, 0, 0)).norm(), 1e-5f);
-  EXPECT_TRUE(map_.MeansNear(SE3(), 10.0).empty());
+  const std::vector<Disc> discs = map_.DiscsNear(pose, 10.0);
+  ASSERT_EQ(discs.size(), 1u);  // no padding, nothing from farther away
+  EXPECT_LT((discs[0].mean - Eigen::Vector3f(-4, 0, 0)).norm(), 1e-5f);
+  EXPECT_NEAR(discs[0].u.dot(discs[0].v), 0.0f, 1e-6f);
+  EXPECT_TRUE(map_.DiscsNear(SE3(), 10.0).empty());
 }
 
 TEST_F(GaussianMapTest, DoesNotMarkAsSeenWhatIsBehindAGapOrOutOfView) {

@@ -24,7 +24,7 @@ class MapperTest : public ::testing::Test {
  protected:
   std::unique_ptr<Mapper> MakeMapper(const MapperConfig& config = {}) {
     auto engine = std::move(MakeSplatEngine(Backend::kCpu, sensor_, config.engine, pool_).value());
-    return std::make_unique<Mapper>(std::move(engine), sensor_, config);
+    return std::make_unique<Mapper>(std::move(engine), sensor_, config, pool_);
   }
   Keyframe KeyframeAt(int k) {
     return StillKeyframe(

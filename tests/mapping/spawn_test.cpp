@@ -71,25 +71,33 @@ Eigen::Vector3f AlongTheBeam(double range_m) {
 /// Spacing of the reduced sensor's beams, which is wider than that of its columns.
 const double kBeamSpacing = 0.5 * std::numbers::pi / 31.0;
 
-SpawnConfig By(ScaleRule rule) {
+/// The keyframe's own pixels alone, as in the paper.
+SpawnConfig FromPixels() {
   SpawnConfig config;
+  config.patches.enabled = false;
+  config.min_opacity = 0.1;
+  return config;
+}
+
+SpawnConfig By(ScaleRule rule) {
+  SpawnConfig config = FromPixels();
   config.scale_rule = rule;
   return config;
 }
 
 SpawnConfig WithoutSmoothing() {
-  SpawnConfig config;
+  SpawnConfig config = FromPixels();
   config.smoothing_depth_m = 0.0;
   return config;
 }
 
 class SpawnGaussiansTest : public ::testing::Test {
  protected:
-  SpawnedGaussians Spawn(const Keyframe& keyframe, const SpawnConfig& config = {}) {
-    return SpawnGaussians(keyframe, nullptr, {}, sensor_, config);
+  SpawnedGaussians Spawn(const Keyframe& keyframe, const SpawnConfig& config = FromPixels()) {
+    return SpawnGaussians(keyframe, nullptr, {}, sensor_, config, pool_);
   }
-  std::vector<Eigen::Vector3f> Existing(const GaussianMap& map, const SE3& T_map_sensor) {
-    return map.MeansNear(T_map_sensor, sensor_.MaxRange());
+  std::vector<Disc> Existing(const GaussianMap& map, const SE3& T_map_sensor) {
+    return map.DiscsNear(T_map_sensor, sensor_.MaxRange());
   }
   Eigen::Vector2d ScalesAt(double range_m, const Eigen::Vector3f& sigma, ScaleRule rule) {
     const SpawnedGaussians spawned =
@@ -148,7 +156,7 @@ TEST_F(SpawnGaussiansTest, AverageAwayMostOfTheNoiseOfTheirMeasurements) {
     std::nth_element(distance.begin(), middle, distance.end());
     return *middle;
   };
-  EXPECT_LT(median_distance({}), 0.6 * median_distance(WithoutSmoothing()));
+  EXPECT_LT(median_distance(FromPixels()), 0.6 * median_distance(WithoutSmoothing()));
 }
 
 TEST_F(SpawnGaussiansTest, CoverARoomOnceAndNotTwice) {
@@ -159,18 +167,21 @@ TEST_F(SpawnGaussiansTest, CoverARoomOnceAndNotTwice) {
   const SpawnedGaussians all = Spawn(first);
   map.AddKeyframe(first, all);
   const RenderOutput render = map.Engine().Render(pose);
-  const SpawnedGaussians more = SpawnGaussians(again, &render, Existing(map, pose), sensor_, {});
+  const SpawnedGaussians more =
+      SpawnGaussians(again, &render, Existing(map, pose), sensor_, FromPixels(), pool_);
   EXPECT_LT(more.gaussians.Size(), 0.05 * static_cast<double>(all.gaussians.Size()));
 }
 
 TEST_F(SpawnGaussiansTest, LeaveOccupiedVoxelsAloneHoweverBadlyTheyAreExplained) {
   const Keyframe keyframe = OnePoint({5.05f, 0.05f, 0.05f}, {0.3f, 0.3f, 0.01f}, 0.0f, pool_);
-  const std::vector<Eigen::Vector3f> same_voxel = {{5.15f, 0.15f, 0.15f}};
-  const std::vector<Eigen::Vector3f> next_voxel = {{5.25f, 0.15f, 0.15f}};
-  SpawnConfig config;
+  SpawnConfig config = FromPixels();
   config.voxel_m = 0.2;
-  EXPECT_EQ(SpawnGaussians(keyframe, nullptr, same_voxel, sensor_, config).gaussians.Size(), 0u);
-  EXPECT_EQ(SpawnGaussians(keyframe, nullptr, next_voxel, sensor_, config).gaussians.Size(), 1u);
+  const auto spawned_beside = [&](const Eigen::Vector3f& mean) {
+    const std::vector<Disc> one = {{mean, {0, 0.1f, 0}, {0, 0, 0.1f}, 0.0f}};
+    return SpawnGaussians(keyframe, nullptr, one, sensor_, config, pool_).gaussians.Size();
+  };
+  EXPECT_EQ(spawned_beside({5.15f, 0.15f, 0.15f}), 0u);  // in its voxel
+  EXPECT_EQ(spawned_beside({5.25f, 0.15f, 0.15f}), 1u);  // in the next
 }
 
 TEST_F(SpawnGaussiansTest, CoverWhatHasAppearedAndNothingElse) {
@@ -184,7 +195,8 @@ TEST_F(SpawnGaussiansTest, CoverWhatHasAppearedAndNothingElse) {
   furnished.Add(cupboard);
   const Keyframe after = StillKeyframe(furnished, sensor_, SE3(), kNoise, 2, pool_);
   const RenderOutput render = map.Engine().Render(SE3());
-  const SpawnedGaussians fresh = SpawnGaussians(after, &render, Existing(map, SE3()), sensor_, {});
+  const SpawnedGaussians fresh =
+      SpawnGaussians(after, &render, Existing(map, SE3()), sensor_, FromPixels(), pool_);
   std::size_t on_the_cupboard = 0;
   for (std::size_t i = 0; i < fresh.gaussians.Size(); ++i) {
     const Triple mean = MeanOf(fresh.gaussians, i);
@@ -282,6 +294,71 @@ TEST_F(SpawnGaussiansTest, NeedAKnownSurface) {
   Keyframe keyframe = OnePoint(AlongTheBeam(5.0), {0.3f, 0.3f, 0.01f}, 0.0f, pool_);
   for (int& surface : keyframe.surface.Pixels()) surface = -1;
   EXPECT_EQ(Spawn(keyframe).gaussians.Size(), 0u);
+}
+
+// The rest is about patches.
+
+/// A keyframe with the scans of two more poses near by.
+Keyframe WithSweep(const RayScene& scene, const SensorModel& sensor, ThreadPool& pool) {
+  Keyframe keyframe = StillKeyframe(scene, sensor, SE3(), kNoise, 1, pool);
+  for (const double y : {-0.2, 0.2}) {
+    const SE3 pose = MakePose(0.01, 0.02, 0.1, 0.1, y, 0.05);
+    const auto seed = static_cast<std::uint64_t>(y > 0 ? 2 : 3);
+    TrackedScan more = TrackedStill(scene, sensor, pose, kNoise, seed, pool);
+    keyframe.tracked.sweep.push_back({pose, std::move(more.points)});
+  }
+  return keyframe;
+}
+
+TEST_F(SpawnGaussiansTest, OfPatchesLieCloserToTheSurfaceThanPixels) {
+  const Keyframe keyframe = WithSweep(Room(), sensor_, pool_);
+  const auto rim_error = [&](const SpawnConfig& config) {
+    const GaussianColumns<float> table = Spawn(keyframe, config).gaussians;
+    double sum = 0.0;
+    for (std::size_t i = 0; i < table.Size(); ++i) {
+      const Triple m = MeanOf(table, i);
+      const Eigen::Vector3d rim =
+          Eigen::Vector3f(Eigen::Vector3f(m[0], m[1], m[2]) +
+                          static_cast<float>(ScaleOf(table, i, 0)) * AxesOf(table, i).col(0))
+              .cast<double>();
+      sum += std::abs(Room().Cast(Eigen::Vector3d::Zero(), rim.normalized()) - rim.norm());
+    }
+    return sum / static_cast<double>(table.Size());
+  };
+  EXPECT_LT(rim_error({}), 0.5 * rim_error(FromPixels()));
+}
+
+TEST_F(SpawnGaussiansTest, OfPatchesReplaceWhatWasMadeOfLess) {
+  const Keyframe first = StillKeyframe(Room(), sensor_, SE3(), kNoise, 1, pool_);
+  GaussianMap map(std::move(MakeSplatEngine(Backend::kCpu, sensor_, {}, pool_).value()));
+  map.AddKeyframe(first, Spawn(first));
+  const std::size_t before = map.Size();
+  const std::vector<Disc> existing = Existing(map, SE3());
+  const RenderOutput render = map.Engine().Render(SE3());
+  const SpawnedGaussians fresh =
+      SpawnGaussians(WithSweep(Room(), sensor_, pool_), &render, existing, sensor_, {}, pool_);
+  ASSERT_EQ(fresh.replaced.size(), before);
+  const auto replaced = std::count(fresh.replaced.begin(), fresh.replaced.end(), 1);
+  EXPECT_GT(static_cast<double>(replaced), 0.5 * static_cast<double>(before));
+  map.Replace(SE3(), sensor_.MaxRange(), fresh.replaced);
+  EXPECT_EQ(map.Size(), before - static_cast<std::size_t>(replaced));
+}
+
+TEST_F(SpawnGaussiansTest, OfPatchesAreNotWhereTheKeyframeSeesThrough) {
+  // A cupboard stands in front of the sensor in the sweep and is gone in the keyframe.
+  RayScene furnished = Room();
+  furnished.Add(Box{{3, -1, -1.5}, {4, 1, 1}});
+  Keyframe keyframe = StillKeyframe(Room(), sensor_, SE3(), kNoise, 1, pool_);
+  keyframe.tracked.sweep.push_back(
+      {SE3(), TrackedStill(furnished, sensor_, SE3(), kNoise, 2, pool_).points});
+  const GaussianColumns<float> table = Spawn(keyframe, {}).gaussians;
+  ASSERT_GT(table.Size(), 100u);
+  for (std::size_t i = 0; i < table.Size(); ++i) {
+    const Triple mean = MeanOf(table, i);
+    EXPECT_FALSE(std::abs(mean[0] - 3.0f) < 0.1f && std::abs(mean[1]) < 0.9f && mean[2] < 0.9f &&
+                 mean[2] > -1.0f)
+        << mean[0] << " " << mean[1] << " " << mean[2];
+  }
 }
 
 }  // namespace

@@ -1,0 +1,263 @@
+#include "covsplat/mapping/patches.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+namespace covsplat {
+namespace {
+
+constexpr double kNoiseWithoutCells = 0.02;
+/// Cosine of the flattest incidence at which the noise of ranges can be told.
+constexpr double kHeadOn = 0.5;
+/// Smaller cells would cut the noise off, not resolve the surface.
+constexpr double kMinCellInNoise = 4.0;
+/// Half the side of an evenly filled square, in its standard deviations.
+constexpr double kEdgeSigmas = 1.7320508;
+
+struct Plane {
+  Eigen::Vector3d mean;
+  Eigen::Matrix3d axes;      ///< columns: ascending variance
+  Eigen::Vector3d variance;  ///< ascending
+  double cosine;             ///< of the incidence of the rays that measured it
+  double density;            ///< measurements per m2, if they fill its extent evenly
+};
+
+Plane PlaneOf(const Moments& moments) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(moments.Covariance());
+  Plane plane;
+  plane.mean = moments.Mean();
+  plane.axes = solver.eigenvectors();
+  plane.variance = solver.eigenvalues().cwiseMax(0.0);
+  const double area_m2 = 12.0 * std::sqrt(plane.variance[1] * plane.variance[2]);
+  plane.density = moments.count / std::max(area_m2, 1e-6);
+  plane.cosine = std::abs(plane.axes.col(0).dot(moments.to_sensor.normalized()));
+  // A plane through n points leaves n - 3 degrees of freedom.
+  plane.variance[0] *= moments.count / std::max(1.0, moments.count - 3.0);
+  return plane;
+}
+
+Moments SumOf(std::span<const PointCell> cells) {
+  Moments sum;
+  for (const PointCell& cell : cells) sum.Add(cell.moments);
+  return sum;
+}
+
+/// Calls f(cells) for each eighth of a cell of some level that holds measurements; `levels_below`
+/// counts from the eighths to the finest cells.
+template <class F>
+void ForEighths(std::span<const PointCell> cells, int levels_below, F&& f) {
+  const int shift = 3 * levels_below;
+  for (std::size_t begin = 0; begin < cells.size();) {
+    std::size_t end = begin + 1;
+    while (end < cells.size() && cells[end].code >> shift == cells[begin].code >> shift) ++end;
+    f(cells.subspan(begin, end - begin));
+    begin = end;
+  }
+}
+
+/// Standard deviation of ranges to flat surfaces: the median among the eighths of the blocks.
+double EstimateNoise(const PointGrid& grid, int min_points) {
+  std::vector<double> variance;
+  for (std::size_t b = 0; b < grid.Blocks(); ++b) {
+    ForEighths(grid.Cells(b), std::max(0, grid.Levels() - 1), [&](auto cells) {
+      const Moments moments = SumOf(cells);
+      if (moments.count < 5.0 * min_points) return;
+      const Plane plane = PlaneOf(moments);
+      if (plane.cosine < kHeadOn || plane.variance[1] < 4.0 * plane.variance[0]) return;
+      variance.push_back(plane.variance[0] / (plane.cosine * plane.cosine));
+    });
+  }
+  if (variance.empty()) return kNoiseWithoutCells;
+  const auto middle = variance.begin() + static_cast<std::ptrdiff_t>(variance.size() / 2);
+  std::nth_element(variance.begin(), middle, variance.end());
+  return std::sqrt(*middle);
+}
+
+/// What all blocks have in common.
+struct FitJob {
+  const PointGrid* grid;
+  const PatchConfig* config;
+  double noise_m;    ///< of ranges
+  int finest_level;  ///< cells are not halved beyond
+};
+
+/// What a block's cells have become.
+struct BlockFit {
+  std::vector<Patch> patches;         ///< frame of the grid
+  std::vector<std::uint8_t> renewed;  ///< [code] whether a new patch has the cell
+  bool has_patch = false;             ///< new or known
+};
+
+bool IsFlat(const Plane& plane, const FitJob& job) {
+  const double noise_m = job.noise_m * plane.cosine;
+  return plane.variance[0] <= noise_m * noise_m + job.config->flatness_m * job.config->flatness_m;
+}
+
+/// Whether the known Gaussians that pass through most of the measurements were made of about as
+/// many.
+bool IsKnown(std::span<const PointCell> cells,
+             double count,
+             double density,
+             std::span<const float> known_density,
+             double renew_factor) {
+  const auto enough = static_cast<float>(density / renew_factor);
+  double known = 0.0;
+  for (const PointCell& cell : cells) {
+    if (known_density[static_cast<std::size_t>(cell.code)] > enough) known += cell.moments.count;
+  }
+  return known > 0.5 * count;
+}
+
+Patch PatchOf(const Plane& plane, const Moments& moments, const Eigen::Vector3d& corner) {
+  Eigen::Vector3d normal = plane.axes.col(0);
+  if (normal.dot(moments.to_sensor) < 0.0) normal = -normal;
+  Patch patch;
+  patch.mean = (plane.mean + corner).cast<float>();
+  patch.axes.col(0) = plane.axes.col(2).cast<float>();
+  patch.axes.col(1) = normal.cross(plane.axes.col(2)).cast<float>();
+  patch.axes.col(2) = normal.cast<float>();
+  patch.sigma_m = plane.variance.reverse().cwiseSqrt().cast<float>();
+  patch.density = static_cast<float>(plane.density);
+  return patch;
+}
+
+/// Goes through a cell of a block from coarse to fine.
+void FitCells(std::span<const PointCell> cells,
+              int level,
+              const Eigen::Vector3d& corner,
+              std::span<const float> known_density,
+              const FitJob& job,
+              BlockFit& fit) {
+  const bool is_finest = level >= job.finest_level;
+  const Moments moments = SumOf(cells);
+  // Cells that cannot be halved do with half the measurements and next to no extent.
+  const int min_points = is_finest ? (job.config->min_points + 1) / 2 : job.config->min_points;
+  if (moments.count < min_points) return;
+  const double min_spread_m = (is_finest ? 0.02 : 0.1) * job.grid->CellSize(level);
+  const Plane plane = PlaneOf(moments);
+  const bool has_extent = plane.variance[1] > min_spread_m * min_spread_m;
+  if (has_extent && (is_finest || IsFlat(plane, job))) {
+    fit.has_patch = true;
+    if (IsKnown(cells, moments.count, plane.density, known_density, job.config->renew_factor)) {
+      return;
+    }
+    fit.patches.push_back(PatchOf(plane, moments, corner));
+    for (const PointCell& cell : cells) fit.renewed[static_cast<std::size_t>(cell.code)] = 1;
+    return;
+  }
+  if (is_finest) return;
+  ForEighths(cells, job.grid->Levels() - level - 1, [&](auto eighth) {
+    FitCells(eighth, level + 1, corner, known_density, job, fit);
+  });
+}
+
+/// Calls f(position) at steps of less than a finest cell over the square that a disc stands for,
+/// a little within its edges, and on both sides close to it.
+template <class F>
+void ForPlacesOf(const Disc& disc, double edge_sigmas, float finest_m, F&& f) {
+  const auto within = [&](const Eigen::Vector3f& axis) -> Eigen::Vector3f {
+    const float length = static_cast<float>(edge_sigmas) * axis.norm();
+    return axis.normalized() * std::max(0.0f, length - 0.25f * finest_m);
+  };
+  const Eigen::Vector3f u = within(disc.u);
+  const Eigen::Vector3f v = within(disc.v);
+  const Eigen::Vector3f off = 0.15f * finest_m * disc.u.cross(disc.v).normalized();
+  const auto steps_u = static_cast<int>(std::round(u.norm() / (0.7f * finest_m)));
+  const auto steps_v = static_cast<int>(std::round(v.norm() / (0.7f * finest_m)));
+  for (int i = -steps_u; i <= steps_u; ++i) {
+    for (int j = -steps_v; j <= steps_v; ++j) {
+      const float a = static_cast<float>(i) / static_cast<float>(std::max(1, steps_u));
+      const float b = static_cast<float>(j) / static_cast<float>(std::max(1, steps_v));
+      for (const float side : {-1.0f, 0.0f, 1.0f}) f(disc.mean + a * u + b * v + side * off);
+    }
+  }
+}
+
+/// [block][code] density of the discs that pass through a cell, 0 where none does.
+std::vector<std::vector<float>> DensityOfDiscs(std::span<const Disc> discs_grid,
+                                               const PointGrid& grid,
+                                               double extent_factor) {
+  constexpr float kLeast = 1e-3f;  // of single pixels: something is there
+  std::vector<std::vector<float>> density(
+      grid.Blocks(), std::vector<float>(static_cast<std::size_t>(grid.CellsPerBlock()), 0.0f));
+  const auto finest_m = static_cast<float>(grid.CellSize(grid.Levels()));
+  for (const Disc& disc : discs_grid) {
+    ForPlacesOf(disc, kEdgeSigmas / extent_factor, finest_m, [&](const Eigen::Vector3f& p) {
+      const std::optional<PointGrid::Place> place = grid.Find(p);
+      if (!place) return;
+      float& known = density[place->block][static_cast<std::size_t>(place->code)];
+      known = std::max({known, disc.density, kLeast});
+    });
+  }
+  return density;
+}
+
+std::vector<Disc> Moved(const SE3& T_to_from, std::span<const Disc> discs) {
+  const Eigen::Matrix3f rotation = T_to_from.RotationMatrix().cast<float>();
+  const Eigen::Vector3f translation = T_to_from.Translation().cast<float>();
+  std::vector<Disc> moved;
+  moved.reserve(discs.size());
+  for (const Disc& disc : discs) {
+    moved.push_back(
+        {rotation * disc.mean + translation, rotation * disc.u, rotation * disc.v, disc.density});
+  }
+  return moved;
+}
+
+Patch Moved(const SE3& T_to_from, Patch patch) {
+  const Eigen::Matrix3f rotation = T_to_from.RotationMatrix().cast<float>();
+  patch.mean = rotation * patch.mean + T_to_from.Translation().cast<float>();
+  patch.axes = rotation * patch.axes;
+  return patch;
+}
+
+FitJob MakeJob(const PointGrid& grid, const PatchConfig& config) {
+  FitJob job{&grid, &config, EstimateNoise(grid, config.min_points), config.levels};
+  while (job.finest_level > 0 && grid.CellSize(job.finest_level) < kMinCellInNoise * job.noise_m) {
+    --job.finest_level;
+  }
+  return job;
+}
+
+}  // namespace
+
+PatchFit FitPatches(std::span<const PosedPoints> scans,
+                    std::span<const Disc> known,
+                    const SensorModel& sensor,
+                    const PatchConfig& config,
+                    ThreadPool& pool) {
+  PatchFit result;
+  if (scans.empty()) return result;
+  const PointGrid grid(scans, sensor, config.cell_m, config.levels, pool);
+  const SE3 T_grid_sensor = grid.FromMap() * scans.back().T_map_sensor;
+  const std::vector<Disc> discs_grid = Moved(T_grid_sensor, known);
+  const auto known_density = DensityOfDiscs(discs_grid, grid, config.extent_factor);
+  const FitJob job = MakeJob(grid, config);
+  std::vector<BlockFit> fits(grid.Blocks());
+  ParallelFor(pool, grid.Blocks(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) {
+      fits[b].renewed.assign(static_cast<std::size_t>(grid.CellsPerBlock()), 0);
+      FitCells(grid.Cells(b), 0, grid.Corner(b), known_density[b], job, fits[b]);
+    }
+  });
+
+  const SE3 T_sensor_grid = T_grid_sensor.Inverse();
+  for (const BlockFit& fit : fits) {
+    for (const Patch& patch : fit.patches) result.patches.push_back(Moved(T_sensor_grid, patch));
+  }
+  for (const int block : grid.BlocksOfLastScan()) {
+    result.has_patch.push_back(block >= 0 && fits[static_cast<std::size_t>(block)].has_patch);
+  }
+  for (const Disc& disc : discs_grid) {
+    const std::optional<PointGrid::Place> place = grid.Find(disc.mean);
+    result.replaced.push_back(
+        place ? fits[place->block].renewed[static_cast<std::size_t>(place->code)]
+              : std::uint8_t{0});
+  }
+  return result;
+}
+
+}  // namespace covsplat

@@ -1,0 +1,167 @@
+#include "covsplat/mapping/point_grid.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace covsplat {
+namespace {
+
+/// More blocks than a sensor's surroundings have; what lies beyond is left out.
+constexpr std::size_t kMaxBlocks = std::size_t{1} << 17;
+
+/// The bits of a coordinate, each in every third place.
+constexpr std::array<int, 16> kSpread = [] {
+  std::array<int, 16> spread{};
+  for (int value = 0; value < 16; ++value) {
+    for (int bit = 0; bit < 4; ++bit) {
+      spread[static_cast<std::size_t>(value)] |= (value >> bit & 1) << 3 * bit;
+    }
+  }
+  return spread;
+}();
+
+}  // namespace
+
+void Moments::Add(const Eigen::Vector3d& point, const Eigen::Vector3d& sensor) {
+  count += 1.0;
+  sum += point;
+  square += point.cwiseAbs2();
+  mixed += Eigen::Vector3d(point.x() * point.y(), point.y() * point.z(), point.z() * point.x());
+  to_sensor += sensor - point;
+}
+
+void Moments::Add(const Moments& other) {
+  count += other.count;
+  sum += other.sum;
+  square += other.square;
+  mixed += other.mixed;
+  to_sensor += other.to_sensor;
+}
+
+Eigen::Matrix3d Moments::Covariance() const {
+  Eigen::Matrix3d second;
+  second << square.x(), mixed.x(), mixed.z(),  //
+      mixed.x(), square.y(), mixed.y(),        //
+      mixed.z(), mixed.y(), square.z();
+  const Eigen::Vector3d mean = Mean();
+  return second / count - mean * mean.transpose();
+}
+
+/// All usable points in the frame of the grid, block after block.
+struct PointGrid::Sorted {
+  struct Point {
+    Eigen::Vector3f p_grid;
+    int scan = 0;
+  };
+  std::vector<Eigen::Vector3d> sensor;  ///< [scans] positions in the frame of the grid
+  std::vector<Point> points;
+  std::vector<std::size_t> begin;  ///< [B + 1]
+};
+
+PointGrid::PointGrid(std::span<const PosedPoints> scans,
+                     const SensorModel& sensor,
+                     double block_m,
+                     int levels,
+                     ThreadPool& pool)
+    : block_m_(block_m), levels_(levels) {
+  if (scans.empty()) return;
+  const Eigen::Vector3d here = scans.back().T_map_sensor.Translation();
+  const Eigen::Vector3d corner = (here / block_m).array().round() * block_m;
+  T_grid_map_ = SE3(Eigen::Quaterniond::Identity(), -corner);
+  const Sorted sorted = SortIntoBlocks(scans, sensor);
+  cells_.resize(index_of_.size());
+  ParallelFor(pool, cells_.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) cells_[b] = CellsOf(sorted, b);
+  });
+}
+
+PointGrid::Sorted PointGrid::SortIntoBlocks(std::span<const PosedPoints> scans,
+                                            const SensorModel& sensor) {
+  Sorted sorted;
+  std::size_t total = 0;
+  for (const PosedPoints& scan : scans) total += scan.points.size();
+  block_at_ = VoxelHash(std::min(total, kMaxBlocks));
+  const auto min_square = static_cast<float>(sensor.MinRange() * sensor.MinRange());
+  const auto max_square = static_cast<float>(sensor.MaxRange() * sensor.MaxRange());
+  const auto blocks_per_m = static_cast<float>(1.0 / block_m_);
+  std::vector<Sorted::Point> points;
+  std::vector<int> block_of;  // -1: left out
+  std::vector<std::size_t> size;
+  points.reserve(total);
+  block_of.reserve(total);
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    const SE3 T_grid_sensor = T_grid_map_ * scans[s].T_map_sensor;
+    const Eigen::Matrix3f rotation = T_grid_sensor.RotationMatrix().cast<float>();
+    const Eigen::Vector3f translation = T_grid_sensor.Translation().cast<float>();
+    sorted.sensor.push_back(T_grid_sensor.Translation());
+    for (const Eigen::Vector3f& p : scans[s].points) {
+      const float square = p.squaredNorm();
+      points.push_back({rotation * p + translation, static_cast<int>(s)});
+      int block = -1;
+      if (square >= min_square && square <= max_square) {
+        const Eigen::Vector3i index = CellOf(blocks_per_m * points.back().p_grid);
+        const auto fresh = static_cast<int>(index_of_.size());
+        block = index_of_.size() < kMaxBlocks ? block_at_.FindOrInsert(index, fresh)
+                                              : block_at_.Find(index);
+        if (block == fresh) {
+          index_of_.push_back(index);
+          size.push_back(0);
+        }
+      }
+      block_of.push_back(block);
+      if (block >= 0) ++size[static_cast<std::size_t>(block)];
+    }
+  }
+  sorted.begin.assign(size.size() + 1, 0);
+  for (std::size_t b = 0; b < size.size(); ++b) sorted.begin[b + 1] = sorted.begin[b] + size[b];
+  sorted.points.resize(sorted.begin.back());
+  std::vector<std::size_t> next(sorted.begin.begin(), sorted.begin.end() - 1);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (block_of[i] < 0) continue;
+    sorted.points[next[static_cast<std::size_t>(block_of[i])]++] = points[i];
+  }
+  const std::size_t last = scans.back().points.size();
+  blocks_of_last_.assign(block_of.end() - static_cast<std::ptrdiff_t>(last), block_of.end());
+  return sorted;
+}
+
+int PointGrid::CodeOf(const Eigen::Vector3f& p_block) const {
+  const auto cells_per_m = static_cast<float>(1.0 / CellSize(levels_));
+  const int last = (1 << levels_) - 1;  // rounding at the faces
+  const Eigen::Vector3i cell = CellOf(cells_per_m * p_block).cwiseMax(0).cwiseMin(last);
+  const Eigen::Array<std::size_t, 3, 1> place = cell.cast<std::size_t>();
+  return kSpread[place.x()] | kSpread[place.y()] << 1 | kSpread[place.z()] << 2;
+}
+
+std::vector<PointCell> PointGrid::CellsOf(const Sorted& sorted, std::size_t block) const {
+  const Eigen::Vector3d corner = Corner(block);
+  const Eigen::Vector3f corner_f = corner.cast<float>();
+  std::vector<int> slot_of(static_cast<std::size_t>(CellsPerBlock()), -1);
+  std::vector<PointCell> cells;
+  for (std::size_t i = sorted.begin[block]; i < sorted.begin[block + 1]; ++i) {
+    const Sorted::Point& point = sorted.points[i];
+    const int code = CodeOf(point.p_grid - corner_f);
+    int& slot = slot_of[static_cast<std::size_t>(code)];
+    if (slot < 0) {
+      slot = static_cast<int>(cells.size());
+      cells.push_back({code, {}});
+    }
+    cells[static_cast<std::size_t>(slot)].moments.Add(
+        point.p_grid.cast<double>() - corner,
+        sorted.sensor[static_cast<std::size_t>(point.scan)] - corner);
+  }
+  std::sort(cells.begin(), cells.end(), [](const PointCell& a, const PointCell& b) {
+    return a.code < b.code;
+  });
+  return cells;
+}
+
+std::optional<PointGrid::Place> PointGrid::Find(const Eigen::Vector3f& p_grid) const {
+  const auto block_m = static_cast<float>(block_m_);
+  const Eigen::Vector3i index = CellOf(p_grid / block_m);
+  const int block = block_at_.Find(index);
+  if (block < 0) return std::nullopt;
+  return Place{static_cast<std::size_t>(block), CodeOf(p_grid - block_m * index.cast<float>())};
+}
+
+}  // namespace covsplat
