@@ -44,7 +44,7 @@ int GaussianMap::AddKeyframe(const Keyframe& keyframe, const SpawnedGaussians& s
   for (std::size_t i = range.begin; i < range.end; ++i) {
     signals_.confidence[i] = spawned.confidence[i - range.begin];
     signals_.control_score[i] = spawned.control_score[i - range.begin];
-    if (!spawned.density.empty()) signals_.density[i] = spawned.density[i - range.begin];
+    signals_.density[i] = spawned.density[i - range.begin];
     signals_.last_seen[i] = number;
     signals_.trackable[i] = 1;
   }
@@ -62,9 +62,7 @@ void GaussianMap::MarkSeen(int keyframe_number,
     const Eigen::Matrix3f rotation = T_sensor_anchor.RotationMatrix().cast<float>();
     const Eigen::Vector3f translation = T_sensor_anchor.Translation().cast<float>();
     for (std::size_t i = range.begin; i < range.end; ++i) {
-      const Eigen::Vector3f mean(
-          table.Column(kMeanX)[i], table.Column(kMeanY)[i], table.Column(kMeanZ)[i]);
-      const Eigen::Vector3f p = rotation * mean + translation;
+      const Eigen::Vector3f p = rotation * MeanOf(table, i) + translation;
       const std::optional<Pixel> pixel = sensor.Project(p);
       if (!pixel) continue;
       const float measured = keyframe.measurement.range_m(pixel->row, pixel->column);
@@ -72,7 +70,7 @@ void GaussianMap::MarkSeen(int keyframe_number,
       if (measured > 0.0f && std::abs(measured - p.norm()) < tolerance) {
         signals_.last_seen[i] = keyframe_number;
         signals_.seen_through[i] = 0;
-      } else if (SeesThrough(keyframe, sensor, p)) {
+      } else if (SeesThrough(keyframe, *pixel, p.norm())) {
         ++signals_.seen_through[i];
       }
     }
@@ -117,9 +115,8 @@ std::size_t GaussianMap::PruneSeenThrough(int keyframes) {
   return RemoveIf([&](std::size_t i) { return signals_.seen_through[i] >= keyframes; });
 }
 
-/// Calls f(row, R_sensor_anchor, mean in the sensor's frame) for every Gaussian near a pose.
-template <class F>
-void GaussianMap::ForNear(const SE3& T_map_sensor, double distance_m, F&& f) const {
+NearGaussians GaussianMap::Near(const SE3& T_map_sensor, double distance_m) const {
+  NearGaussians near;
   const GaussianColumns<float>& table = engine_->Gaussians();
   const auto limit = static_cast<float>(distance_m * distance_m);
   for (const AnchorRange& range : engine_->Ranges()) {
@@ -128,42 +125,24 @@ void GaussianMap::ForNear(const SE3& T_map_sensor, double distance_m, F&& f) con
     const Eigen::Matrix3f rotation = T_sensor_anchor.RotationMatrix().cast<float>();
     const Eigen::Vector3f translation = T_sensor_anchor.Translation().cast<float>();
     for (std::size_t i = range.begin; i < range.end; ++i) {
-      const Eigen::Vector3f mean(
-          table.Column(kMeanX)[i], table.Column(kMeanY)[i], table.Column(kMeanZ)[i]);
-      const Eigen::Vector3f p = rotation * mean + translation;
-      if (p.squaredNorm() < limit) f(i, rotation, p);
+      const Eigen::Vector3f mean = rotation * MeanOf(table, i) + translation;
+      if (!(mean.squaredNorm() < limit)) continue;
+      const Eigen::Matrix3f axes = rotation * RotationOf(table, i).normalized().toRotationMatrix();
+      const Disc disc = {mean,
+                         std::exp(table.Column(kLogScaleU)[i]) * axes.col(0),
+                         std::exp(table.Column(kLogScaleV)[i]) * axes.col(1),
+                         signals_.density[i]};
+      if (!disc.u.allFinite() || !disc.v.allFinite()) continue;
+      near.discs.push_back(disc);
+      near.row.push_back(i);
     }
   }
+  return near;
 }
 
-std::vector<Disc> GaussianMap::DiscsNear(const SE3& T_map_sensor, double distance_m) const {
-  std::vector<Disc> discs;
-  const GaussianColumns<float>& table = engine_->Gaussians();
-  ForNear(T_map_sensor,
-          distance_m,
-          [&](std::size_t i, const Eigen::Matrix3f& rotation, const Eigen::Vector3f& mean) {
-            const Eigen::Matrix3f axes = rotation * Eigen::Quaternionf(table.Column(kQuatW)[i],
-                                                                       table.Column(kQuatX)[i],
-                                                                       table.Column(kQuatY)[i],
-                                                                       table.Column(kQuatZ)[i])
-                                                        .normalized()
-                                                        .toRotationMatrix();
-            discs.push_back({mean,
-                             std::exp(table.Column(kLogScaleU)[i]) * axes.col(0),
-                             std::exp(table.Column(kLogScaleV)[i]) * axes.col(1),
-                             signals_.density[i]});
-          });
-  return discs;
-}
-
-std::size_t GaussianMap::Replace(const SE3& T_map_sensor,
-                                 double distance_m,
-                                 std::span<const std::uint8_t> replaced) {
+std::size_t GaussianMap::Remove(std::span<const std::size_t> rows) {
   std::vector<std::uint8_t> goes(engine_->Gaussians().Size(), 0);
-  std::size_t next = 0;
-  ForNear(T_map_sensor, distance_m, [&](std::size_t i, const auto&, const auto&) {
-    goes[i] = replaced[next++];
-  });
+  for (const std::size_t i : rows) goes[i] = 1;
   return RemoveIf([&](std::size_t i) { return goes[i] != 0; });
 }
 

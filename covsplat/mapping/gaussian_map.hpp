@@ -19,6 +19,12 @@ struct GaussianSignals {
   void Resize(std::size_t size);
 };
 
+/// Some of a map's Gaussians.
+struct NearGaussians {
+  std::vector<Disc> discs;
+  std::vector<std::size_t> row;  ///< of each, in the engine's table until that changes
+};
+
 /// One owner, one thread. Keyframes are the engine's anchors, numbered alike.
 class GaussianMap {
  public:
@@ -37,12 +43,10 @@ class GaussianMap {
   /// Removes Gaussians that so many keyframes have seen through: what they show has moved on.
   std::size_t PruneSeenThrough(int keyframes);
 
-  /// Gaussians whose means are within a distance of a pose, in its frame.
-  std::vector<Disc> DiscsNear(const SE3& T_map_sensor, double distance_m) const;
-  /// Removes those of the Gaussians that the same call of DiscsNear lists; returns how many went.
-  std::size_t Replace(const SE3& T_map_sensor,
-                      double distance_m,
-                      std::span<const std::uint8_t> replaced);
+  /// Gaussians whose means are within a distance of a pose, in its frame; none that is not finite.
+  NearGaussians Near(const SE3& T_map_sensor, double distance_m) const;
+  /// Removes rows of the engine's table; returns how many went.
+  std::size_t Remove(std::span<const std::size_t> rows);
 
   /// Gaussians in the map, padding not counted.
   std::size_t Size() const;
@@ -58,8 +62,6 @@ class GaussianMap {
   const GaussianColumns<float>& AsSpawned() const { return as_spawned_; }
 
  private:
-  template <class F>
-  void ForNear(const SE3& T_map_sensor, double distance_m, F&& f) const;
   template <class F>
   std::size_t RemoveIf(F&& f);
 

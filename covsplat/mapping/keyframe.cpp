@@ -1,7 +1,6 @@
 #include "covsplat/mapping/keyframe.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
 #include "covsplat/mapping/signals.hpp"
@@ -57,18 +56,14 @@ Keyframe MakeKeyframe(TrackedScan tracked,
   return keyframe;
 }
 
-bool SeesThrough(const Keyframe& keyframe,
-                 const SensorModel& sensor,
-                 const Eigen::Vector3f& place) {
-  const std::optional<Pixel> pixel = sensor.Project(place);
-  if (!pixel) return false;
+bool SeesThrough(const Keyframe& keyframe, Pixel pixel, float range_m) {
   const Image<float>& measured = keyframe.measurement.range_m;
-  const float beyond_m = kBeyondM + (1.0f + kBeyondRatio) * place.norm();
-  const int last_row = std::min(pixel->row + 1, measured.Rows() - 1);
+  const float beyond_m = kBeyondM + (1.0f + kBeyondRatio) * range_m;
+  const int last_row = std::min(pixel.row + 1, measured.Rows() - 1);
   bool measures = false;
-  for (int row = std::max(pixel->row - 1, 0); row <= last_row; ++row) {
+  for (int row = std::max(pixel.row - 1, 0); row <= last_row; ++row) {
     for (int k = -1; k <= 1; ++k) {
-      const int column = (pixel->column + k + measured.Columns()) % measured.Columns();
+      const int column = (pixel.column + k + measured.Columns()) % measured.Columns();
       if (measured(row, column) <= 0.0f) continue;
       if (measured(row, column) < beyond_m) return false;
       measures = true;

@@ -13,6 +13,12 @@
 
 namespace covsplat {
 
+/// Of a scan that is no keyframe, what the next keyframe takes along.
+struct SweptScan {
+  SE3 T_map_sensor;
+  std::vector<Eigen::Vector3f> points;  ///< all points, deskewed, sensor frame at mid scan, m
+};
+
 /// A scan with its pose: everything that crosses from tracking to mapping. All vectors are in the
 /// sensor frame at mid scan.
 struct TrackedScan {
@@ -23,7 +29,7 @@ struct TrackedScan {
   std::vector<Eigen::Vector3f> surface;     ///< [S] deskewed source points of the registration, m
   std::vector<PointCovariance> covariance;  ///< [S] the surface around each
   std::vector<float> squared_distance;      ///< [S] m^2 to the target, infinity where unmatched
-  std::vector<PosedPoints> sweep;           ///< of a keyframe: the scans since the one before
+  std::vector<SweptScan> sweep;             ///< of a keyframe: the scans since the one before
 };
 
 /// A tracked scan on the sensor's image grid, with the surface each pixel lies on.
@@ -74,8 +80,8 @@ Keyframe MakeKeyframe(TrackedScan tracked,
                       double max_surface_distance_m,
                       ThreadPool& pool);
 
-/// Whether the keyframe measured beyond a place (sensor frame) and nothing near it in the pixels
-/// around: what was there has moved on.
-bool SeesThrough(const Keyframe& keyframe, const SensorModel& sensor, const Eigen::Vector3f& place);
+/// Whether the keyframe measured beyond a place in a pixel's direction, and nothing near it in the
+/// pixels around: what was there has moved on.
+bool SeesThrough(const Keyframe& keyframe, Pixel pixel, float range_m);
 
 }  // namespace covsplat

@@ -86,18 +86,6 @@ std::vector<T> Values(const PointTable& table, std::string_view name, T missing)
 
 }  // namespace
 
-Eigen::Quaternionf RotationOf(const GaussianColumns<float>& gaussians, std::size_t row) {
-  return {gaussians.Column(kQuatW)[row],
-          gaussians.Column(kQuatX)[row],
-          gaussians.Column(kQuatY)[row],
-          gaussians.Column(kQuatZ)[row]};
-}
-
-Eigen::Vector3f MeanOf(const GaussianColumns<float>& gaussians, std::size_t row) {
-  return {
-      gaussians.Column(kMeanX)[row], gaussians.Column(kMeanY)[row], gaussians.Column(kMeanZ)[row]};
-}
-
 Eigen::Vector3f NormalOf(const GaussianColumns<float>& gaussians, std::size_t row) {
   return RotationOf(gaussians, row) * Eigen::Vector3f::UnitZ();
 }

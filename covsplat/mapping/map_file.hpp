@@ -22,9 +22,6 @@ struct SavedMap {
 /// All Gaussians, moved from their keyframes' frames to the map frame.
 SavedMap FlattenMap(const GaussianMap& map);
 
-/// Orientation, mean and normal of one row.
-Eigen::Quaternionf RotationOf(const GaussianColumns<float>& gaussians, std::size_t row);
-Eigen::Vector3f MeanOf(const GaussianColumns<float>& gaussians, std::size_t row);
 Eigen::Vector3f NormalOf(const GaussianColumns<float>& gaussians, std::size_t row);
 
 /// Writes binary little-endian floats, at once: x y z, normal, colour (from the normal, as f_dc),

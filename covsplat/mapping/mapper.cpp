@@ -21,14 +21,12 @@ void Mapper::Insert(const Keyframe& keyframe) {
   const SE3& T_map_sensor = keyframe.tracked.T_map_sensor;
   std::optional<RenderOutput> render;
   if (map_.Keyframes() > 0) render = Render(T_map_sensor);
-  const double reach_m = sensor_.MaxRange();
-  const SpawnedGaussians spawned = SpawnGaussians(keyframe,
-                                                  render ? &*render : nullptr,
-                                                  map_.DiscsNear(T_map_sensor, reach_m),
-                                                  sensor_,
-                                                  config_.spawn,
-                                                  pool_);
-  if (!spawned.replaced.empty()) map_.Replace(T_map_sensor, reach_m, spawned.replaced);
+  const NearGaussians near = map_.Near(T_map_sensor, sensor_.MaxRange());
+  const SpawnedGaussians spawned = SpawnGaussians(
+      keyframe, render ? &*render : nullptr, near.discs, sensor_, config_.spawn, pool_);
+  std::vector<std::size_t> replaced;
+  for (const std::size_t i : spawned.replaced) replaced.push_back(near.row[i]);
+  map_.Remove(replaced);
   const int number = map_.AddKeyframe(keyframe, spawned);
   map_.MarkSeen(number, keyframe, sensor_);
   map_.PruneSeenThrough(config_.prune_seen_through);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
+#include "covsplat/registration/symmetric_eigen.hpp"
 
 namespace covsplat {
 namespace {
@@ -18,24 +18,23 @@ constexpr double kEdgeSigmas = 1.7320508;
 
 struct Plane {
   Eigen::Vector3d mean;
-  Eigen::Matrix3d axes;      ///< columns: ascending variance
-  Eigen::Vector3d variance;  ///< ascending
+  Eigen::Matrix3d axes;      ///< columns: descending variance, so the last is the normal
+  Eigen::Vector3d variance;  ///< descending
   double cosine;             ///< of the incidence of the rays that measured it
   double density;            ///< measurements per m2, if they fill its extent evenly
 };
 
 Plane PlaneOf(const Moments& moments) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-  solver.computeDirect(moments.Covariance());
+  const SymmetricEigen eigen = DecomposeSymmetric(moments.Covariance());
   Plane plane;
   plane.mean = moments.Mean();
-  plane.axes = solver.eigenvectors();
-  plane.variance = solver.eigenvalues().cwiseMax(0.0);
-  const double area_m2 = 12.0 * std::sqrt(plane.variance[1] * plane.variance[2]);
+  plane.axes = eigen.vectors;
+  plane.variance = eigen.values.cwiseMax(0.0);
+  const double area_m2 = 12.0 * std::sqrt(plane.variance[0] * plane.variance[1]);
   plane.density = moments.count / std::max(area_m2, 1e-6);
-  plane.cosine = std::abs(plane.axes.col(0).dot(moments.to_sensor.normalized()));
+  plane.cosine = std::abs(plane.axes.col(2).dot(moments.to_sensor.normalized()));
   // A plane through n points leaves n - 3 degrees of freedom.
-  plane.variance[0] *= moments.count / std::max(1.0, moments.count - 3.0);
+  plane.variance[2] *= moments.count / std::max(1.0, moments.count - 3.0);
   return plane;
 }
 
@@ -66,8 +65,8 @@ double EstimateNoise(const PointGrid& grid, int min_points) {
       const Moments moments = SumOf(cells);
       if (moments.count < 5.0 * min_points) return;
       const Plane plane = PlaneOf(moments);
-      if (plane.cosine < kHeadOn || plane.variance[1] < 4.0 * plane.variance[0]) return;
-      variance.push_back(plane.variance[0] / (plane.cosine * plane.cosine));
+      if (plane.cosine < kHeadOn || plane.variance[1] < 4.0 * plane.variance[2]) return;
+      variance.push_back(plane.variance[2] / (plane.cosine * plane.cosine));
     });
   }
   if (variance.empty()) return kNoiseWithoutCells;
@@ -93,7 +92,7 @@ struct BlockFit {
 
 bool IsFlat(const Plane& plane, const FitJob& job) {
   const double noise_m = job.noise_m * plane.cosine;
-  return plane.variance[0] <= noise_m * noise_m + job.config->flatness_m * job.config->flatness_m;
+  return plane.variance[2] <= noise_m * noise_m + job.config->flatness_m * job.config->flatness_m;
 }
 
 /// Whether the known Gaussians that pass through most of the measurements were made of about as
@@ -112,14 +111,12 @@ bool IsKnown(std::span<const PointCell> cells,
 }
 
 Patch PatchOf(const Plane& plane, const Moments& moments, const Eigen::Vector3d& corner) {
-  Eigen::Vector3d normal = plane.axes.col(0);
-  if (normal.dot(moments.to_sensor) < 0.0) normal = -normal;
+  const double side = plane.axes.col(2).dot(moments.to_sensor) < 0.0 ? -1.0 : 1.0;
   Patch patch;
   patch.mean = (plane.mean + corner).cast<float>();
-  patch.axes.col(0) = plane.axes.col(2).cast<float>();
-  patch.axes.col(1) = normal.cross(plane.axes.col(2)).cast<float>();
-  patch.axes.col(2) = normal.cast<float>();
-  patch.sigma_m = plane.variance.reverse().cwiseSqrt().cast<float>();
+  patch.axes.col(0) = plane.axes.col(0).cast<float>();
+  patch.axes.rightCols<2>() = (side * plane.axes.rightCols<2>()).cast<float>();
+  patch.sigma_m = plane.variance.cwiseSqrt().cast<float>();
   patch.density = static_cast<float>(plane.density);
   return patch;
 }
@@ -158,9 +155,10 @@ void FitCells(std::span<const PointCell> cells,
 /// a little within its edges, and on both sides close to it.
 template <class F>
 void ForPlacesOf(const Disc& disc, double edge_sigmas, float finest_m, F&& f) {
+  constexpr float kMaxEdgeM = 5.0f;  // maps have none that large; one would take forever
   const auto within = [&](const Eigen::Vector3f& axis) -> Eigen::Vector3f {
-    const float length = static_cast<float>(edge_sigmas) * axis.norm();
-    return axis.normalized() * std::max(0.0f, length - 0.25f * finest_m);
+    const float length = static_cast<float>(edge_sigmas) * axis.norm() - 0.25f * finest_m;
+    return axis.normalized() * std::clamp(length, 0.0f, kMaxEdgeM);
   };
   const Eigen::Vector3f u = within(disc.u);
   const Eigen::Vector3f v = within(disc.v);
@@ -251,11 +249,11 @@ PatchFit FitPatches(std::span<const PosedPoints> scans,
   for (const int block : grid.BlocksOfLastScan()) {
     result.has_patch.push_back(block >= 0 && fits[static_cast<std::size_t>(block)].has_patch);
   }
-  for (const Disc& disc : discs_grid) {
-    const std::optional<PointGrid::Place> place = grid.Find(disc.mean);
-    result.replaced.push_back(
-        place ? fits[place->block].renewed[static_cast<std::size_t>(place->code)]
-              : std::uint8_t{0});
+  for (std::size_t i = 0; i < discs_grid.size(); ++i) {
+    const std::optional<PointGrid::Place> place = grid.Find(discs_grid[i].mean);
+    if (!place) continue;
+    const BlockFit& fit = fits[place->block];
+    if (fit.renewed[static_cast<std::size_t>(place->code)] != 0) result.replaced.push_back(i);
   }
   return result;
 }

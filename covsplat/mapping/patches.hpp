@@ -67,8 +67,7 @@ struct PatchFit {
   std::vector<Patch> patches;
   /// [points of the last scan] whether there are patches, new or known, in its largest cell.
   std::vector<std::uint8_t> has_patch;
-  /// [known discs] whether a patch replaces it.
-  std::vector<std::uint8_t> replaced;
+  std::vector<std::size_t> replaced;  ///< which of the known discs give way to patches
 };
 
 /// Sorts the measurements into cells that are aligned with the map, halves cells until each is flat

@@ -16,7 +16,7 @@ namespace covsplat {
 /// Measurements of one scan, in the sensor's frame at its pose.
 struct PosedPoints {
   SE3 T_map_sensor;
-  std::vector<Eigen::Vector3f> points;  ///< m
+  std::span<const Eigen::Vector3f> points;  ///< m
 };
 
 /// Sums over measurements, their positions relative to a corner.

@@ -178,11 +178,8 @@ void Append(const Eigen::Vector3f& mean,
   spawned.density.push_back(density);
 }
 
-/// Control score of the surface that the keyframe shows at a place, NaN where it shows none.
-float ControlScoreAt(const Keyframe& keyframe,
-                     const SensorModel& sensor,
-                     const Eigen::Vector3f& place) {
-  const std::optional<Pixel> pixel = sensor.Project(place);
+/// Control score of the surface that the keyframe shows in a pixel, NaN where it shows none.
+float ControlScoreAt(const Keyframe& keyframe, const std::optional<Pixel>& pixel) {
   const int surface = pixel ? keyframe.surface(pixel->row, pixel->column) : -1;
   if (surface < 0) return std::numeric_limits<float>::quiet_NaN();
   return keyframe.control_score[static_cast<std::size_t>(surface)];
@@ -194,12 +191,13 @@ void SpawnFromPatches(const Keyframe& keyframe,
                       const SpawnConfig& config,
                       SpawnedGaussians& spawned) {
   for (const Patch& patch : patches) {
-    if (SeesThrough(keyframe, sensor, patch.mean)) continue;
+    const std::optional<Pixel> pixel = sensor.Project(patch.mean);
+    if (pixel && SeesThrough(keyframe, *pixel, patch.mean.norm())) continue;
     const Eigen::Vector2d scales =
         (config.patches.extent_factor * patch.sigma_m.head<2>().cast<double>())
             .cwiseMax(config.min_scale_m)
             .cwiseMin(config.max_scale_m);
-    const float score = ControlScoreAt(keyframe, sensor, patch.mean);
+    const float score = ControlScoreAt(keyframe, pixel);
     Append(patch.mean, patch.axes, scales, score, patch.density, config, spawned);
   }
 }
@@ -227,9 +225,11 @@ void SpawnFromPixels(const Keyframe& keyframe,
 }
 
 /// The keyframe's own points come last.
-std::vector<PosedPoints> WithSweep(const Keyframe& keyframe) {
-  std::vector<PosedPoints> scans = keyframe.tracked.sweep;
-  scans.push_back({keyframe.tracked.T_map_sensor, keyframe.tracked.points});
+std::vector<PosedPoints> WithSweep(const TrackedScan& tracked) {
+  std::vector<PosedPoints> scans;
+  scans.reserve(tracked.sweep.size() + 1);
+  for (const SweptScan& scan : tracked.sweep) scans.push_back({scan.T_map_sensor, scan.points});
+  scans.push_back({tracked.T_map_sensor, tracked.points});
   return scans;
 }
 
@@ -244,7 +244,7 @@ SpawnedGaussians SpawnGaussians(const Keyframe& keyframe,
   SpawnedGaussians spawned;
   PatchFit fit;
   if (config.patches.enabled) {
-    fit = FitPatches(WithSweep(keyframe), existing_sensor, sensor, config.patches, pool);
+    fit = FitPatches(WithSweep(keyframe.tracked), existing_sensor, sensor, config.patches, pool);
     spawned.replaced = std::move(fit.replaced);
     SpawnFromPatches(keyframe, fit.patches, sensor, config, spawned);
   }

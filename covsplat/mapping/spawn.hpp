@@ -81,11 +81,10 @@ struct SpawnConfig {
 /// New Gaussians in the keyframe's frame with the signals that come from tracking.
 struct SpawnedGaussians {
   GaussianColumns<float> gaussians;
-  std::vector<float> confidence;     ///< [N] u
-  std::vector<float> control_score;  ///< [N] c, NaN where unknown
-  std::vector<float> density;        ///< [N] measurements per m2, 0 of single pixels
-  /// [existing Gaussians] whether new ones replace it.
-  std::vector<std::uint8_t> replaced;
+  std::vector<float> confidence;      ///< [N] u
+  std::vector<float> control_score;   ///< [N] c, NaN where unknown
+  std::vector<float> density;         ///< [N] measurements per m2, 0 of single pixels
+  std::vector<std::size_t> replaced;  ///< which of the existing Gaussians give way to them
 };
 
 /// Patches through all scans since the last keyframe where they lie dense enough; elsewhere the

@@ -29,15 +29,10 @@ void AppendSurfels(const GaussianMap& map,
     // Written so that NaN fails.
     if (!(opacity >= static_cast<float>(config.min_opacity))) continue;
     if (!(gamma >= static_cast<float>(config.min_confidence))) continue;
-    const Eigen::Vector3f mean(
-        table.Column(kMeanX)[i], table.Column(kMeanY)[i], table.Column(kMeanZ)[i]);
     TargetSurfel surfel;
-    surfel.mean = rotation * mean + translation;
+    surfel.mean = rotation * MeanOf(table, i) + translation;
     if (surfel.mean.squaredNorm() > reach * reach) continue;
-    surfel.rotation = q_origin_anchor * Eigen::Quaternionf(table.Column(kQuatW)[i],
-                                                           table.Column(kQuatX)[i],
-                                                           table.Column(kQuatY)[i],
-                                                           table.Column(kQuatZ)[i]);
+    surfel.rotation = q_origin_anchor * RotationOf(table, i);
     surfel.scale0 = std::exp(table.Column(kLogScaleU)[i]);
     surfel.scale1 = std::exp(table.Column(kLogScaleV)[i]);
     if (config.weight_by_confidence) surfel.confidence = std::max(gamma, kMinWeight);

@@ -23,14 +23,9 @@ void MoveInto(const SE3& T_anchor_map,
               GaussianColumns<float>& to,
               std::size_t row) {
   for (int p = 0; p < kParameterCount; ++p) to.Column(p)[row] = from.Column(p)[i];
-  const Eigen::Vector3d mean(
-      from.Column(kMeanX)[i], from.Column(kMeanY)[i], from.Column(kMeanZ)[i]);
-  const Eigen::Quaterniond rotation(from.Column(kQuatW)[i],
-                                    from.Column(kQuatX)[i],
-                                    from.Column(kQuatY)[i],
-                                    from.Column(kQuatZ)[i]);
-  const Eigen::Vector3d moved = T_anchor_map * mean;
-  const Eigen::Quaterniond turned = T_anchor_map.Rotation() * rotation.normalized();
+  const Eigen::Vector3d moved = T_anchor_map * MeanOf(from, i).cast<double>();
+  const Eigen::Quaterniond turned =
+      T_anchor_map.Rotation() * RotationOf(from, i).cast<double>().normalized();
   for (int k = 0; k < 3; ++k) {
     to.Column(kMeanX + k)[row] = static_cast<float>(moved[k]);
     to.Column(kQuatX + k)[row] = static_cast<float>(turned.vec()[k]);
@@ -44,16 +39,14 @@ SurfelDisc DiscOf(const SurfelMap& map, std::size_t i) {
   constexpr double kSigmas = 2.0;
   constexpr double kMaxRadiusM = 5.0;  // maps have none that large
   const GaussianColumns<float>& table = map.gaussians;
-  const Eigen::Quaterniond q(table.Column(kQuatW)[i],
-                             table.Column(kQuatX)[i],
-                             table.Column(kQuatY)[i],
-                             table.Column(kQuatZ)[i]);
+  const Eigen::Quaterniond q = RotationOf(table, i).cast<double>();
   const auto radius = [&](Parameter scale) {
     return std::min(kSigmas * std::exp(static_cast<double>(table.Column(scale)[i])), kMaxRadiusM);
   };
-  const Eigen::Vector3d mean(
-      table.Column(kMeanX)[i], table.Column(kMeanY)[i], table.Column(kMeanZ)[i]);
-  return {mean, q.normalized().toRotationMatrix(), radius(kLogScaleU), radius(kLogScaleV)};
+  return {MeanOf(table, i).cast<double>(),
+          q.normalized().toRotationMatrix(),
+          radius(kLogScaleU),
+          radius(kLogScaleV)};
 }
 
 std::size_t DropBroken(SurfelMap& map) {

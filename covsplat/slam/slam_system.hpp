@@ -94,7 +94,7 @@ class SlamSystem {
   Tracker tracker_;
   std::optional<Trajectory> given_poses_;
   std::vector<HeldOut> held_out_;
-  std::vector<PosedPoints> sweep_;  ///< scans since the last keyframe
+  std::vector<SweptScan> sweep_;  ///< scans since the last keyframe
   std::vector<std::int64_t> keyframe_scans_;
   std::int64_t scans_ = 0;
   int held_out_stride_;

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 namespace covsplat {
 
 /// Optimised parameters of a Gaussian. Its in-plane axes and normal are the columns of the rotation
@@ -65,6 +67,19 @@ class ColumnTable {
 
 template <class S>
 using GaussianColumns = ColumnTable<S, kParameterCount>;
+
+inline Eigen::Vector3f MeanOf(const GaussianColumns<float>& gaussians, std::size_t row) {
+  return {
+      gaussians.Column(kMeanX)[row], gaussians.Column(kMeanY)[row], gaussians.Column(kMeanZ)[row]};
+}
+
+/// As stored: nearly of unit length.
+inline Eigen::Quaternionf RotationOf(const GaussianColumns<float>& gaussians, std::size_t row) {
+  return {gaussians.Column(kQuatW)[row],
+          gaussians.Column(kQuatX)[row],
+          gaussians.Column(kQuatY)[row],
+          gaussians.Column(kQuatZ)[row]};
+}
 
 /// Gaussians [begin, end) of a table live in the frame of one anchor. `begin` is a multiple of
 /// kBlockSize, so that no two ranges share a block; what lies between ranges is padding.

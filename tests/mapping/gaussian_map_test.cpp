@@ -33,6 +33,7 @@ SpawnedGaussians Tagged(int first, int count) {
                 opacity);
     spawned.confidence.push_back(1e-3f * static_cast<float>(tag));
     spawned.control_score.push_back(static_cast<float>(-tag));
+    spawned.density.push_back(2.0f * static_cast<float>(tag));
   }
   return spawned;
 }
@@ -46,6 +47,7 @@ SpawnedGaussians GaussiansAt(const std::vector<Eigen::Vector3d>& places) {
   }
   spawned.confidence.assign(places.size(), 1.0f);
   spawned.control_score.assign(places.size(), 0.0f);
+  spawned.density.assign(places.size(), 0.0f);
   return spawned;
 }
 
@@ -72,6 +74,7 @@ class GaussianMapTest : public ::testing::Test {
         const float tag = map_.Engine().Gaussians().Column(kMeanX)[i];
         EXPECT_EQ(map_.Signals().confidence[i], 1e-3f * tag);
         EXPECT_EQ(map_.Signals().control_score[i], -tag);
+        EXPECT_EQ(map_.Signals().density[i], 2.0f * tag);
         EXPECT_EQ(map_.Signals().last_seen[i], range.anchor);
         EXPECT_EQ(map_.Signals().trackable[i], 1);
         for (int p = 0; p < kParameterCount; ++p) {
@@ -133,6 +136,9 @@ TEST_F(GaussianMapTest, PrunesGaussiansThatAreNoLongerFinite) {
   map_.AddKeyframe(Sphere(SE3(), 5.0f), broken);
   map_.AddKeyframe(Sphere(SE3(), 5.0f), spawned);
   map_.MarkSeen(1, Sphere(SE3(), 5.0f), sensor_);  // must survive them
+  for (const Disc& disc : map_.Near(SE3(), 10.0).discs) {
+    EXPECT_TRUE(disc.mean.allFinite() && disc.u.allFinite() && disc.v.allFinite());
+  }
   EXPECT_EQ(map_.PruneOpacity(kPruneOpacity), static_cast<std::size_t>(kParameterCount));
   EXPECT_EQ(map_.Size(), 2u);
   EXPECT_EQ(map_.Engine().Gaussians().Column(kMeanX)[0], 1.0f);
@@ -168,11 +174,14 @@ TEST_F(GaussianMapTest, FindsDiscsAroundAPoseInItsFrame) {
   const SE3 keyframe = MakePose(0, 0, 0.5, 1000, -400, 1);
   map_.AddKeyframe(Sphere(keyframe, 5.0f), GaussiansAt({{5, 0, 0}, {0, 15, 0}}));
   const SE3 pose = keyframe * MakePose(0, 0, std::numbers::pi, 1, 0, 0);
-  const std::vector<Disc> discs = map_.DiscsNear(pose, 10.0);
-  ASSERT_EQ(discs.size(), 1u);  // no padding, nothing from farther away
-  EXPECT_LT((discs[0].mean - Eigen::Vector3f(-4, 0, 0)).norm(), 1e-5f);
-  EXPECT_NEAR(discs[0].u.dot(discs[0].v), 0.0f, 1e-6f);
-  EXPECT_TRUE(map_.DiscsNear(SE3(), 10.0).empty());
+  const NearGaussians near = map_.Near(pose, 10.0);
+  ASSERT_EQ(near.discs.size(), 1u);  // no padding, nothing from farther away
+  EXPECT_LT((near.discs[0].mean - Eigen::Vector3f(-4, 0, 0)).norm(), 1e-5f);
+  EXPECT_NEAR(near.discs[0].u.dot(near.discs[0].v), 0.0f, 1e-6f);
+  EXPECT_TRUE(map_.Near(SE3(), 10.0).discs.empty());
+  EXPECT_EQ(map_.Remove(near.row), 1u);
+  EXPECT_TRUE(map_.Near(pose, 10.0).discs.empty());
+  EXPECT_EQ(map_.Size(), 1u);
 }
 
 TEST_F(GaussianMapTest, DoesNotMarkAsSeenWhatIsBehindAGapOrOutOfView) {

@@ -51,6 +51,7 @@ SpawnedGaussians GaussianAt(float x, float score) {
   }
   spawned.confidence = {0.7f};
   spawned.control_score = {score};
+  spawned.density = {0.0f};
   return spawned;
 }
 

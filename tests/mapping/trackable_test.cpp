@@ -30,6 +30,7 @@ SpawnedGaussians Spawned(const std::vector<Surfel>& surfels) {
     SetGaussian(spawned.gaussians, i, s.mean, s.q, s.scale_u, s.scale_v, s.opacity);
     spawned.confidence.push_back(s.confidence);
     spawned.control_score.push_back(0.0f);
+    spawned.density.push_back(0.0f);
   }
   return spawned;
 }
