@@ -34,6 +34,7 @@ bench: setup build-release  ## Run the benchmarks
 
 # The peers need packages of PyPI; they live in .venv and nowhere else.
 .venv/peers: bench/peers/requirements.txt
+	@tools/setup.sh --with-python
 	python3 -m venv .venv
 	.venv/bin/pip install --quiet --disable-pip-version-check -r $<
 	@touch $@
@@ -52,7 +53,7 @@ bench-peers: setup build-release .venv/peers $(addprefix simulate-,$(WORLDS))  #
 	  $(if $(ONLY),--only '$(ONLY)',--update docs/benchmarks.md)
 
 .venv/oracles: tools/oracles/requirements.txt
-	@tools/setup.sh --with-oracles
+	@tools/setup.sh --with-python
 	python3 -m venv .venv/oracles
 	.venv/oracles/bin/pip install --quiet --disable-pip-version-check -r $<
 	@touch $@

@@ -16,7 +16,8 @@ constexpr std::array kStages = {
 std::string Header() {
   std::string line =
       "scan,stamp_s,state,keyframe,points,not_finite,out_of_range,has_time,source_points,"
-      "correspondences,inlier_ratio,overlap,rms_residual_m,iterations,degenerate_directions,"
+      "correspondences,inlier_ratio,overlap,support,rms_residual_m,iterations,degenerate_"
+      "directions,"
       "gaussians,target_surfels,mapper_steps,rss_bytes,track_ms";
   for (const char* stage : kStages) line += fmt::format(",{}_ms", stage);
   return line + "\n";
@@ -32,11 +33,12 @@ std::string Row(const ScanRecord& r, std::int64_t rss_bytes) {
                                  r.not_finite,
                                  r.out_of_range,
                                  r.has_time);
-  line += fmt::format("{},{},{:.4f},{:.4f},{:.5f},{},{},{},{},{},{},{:.3f}",
+  line += fmt::format("{},{},{:.4f},{:.4f},{:.4f},{:.5f},{},{},{},{},{},{},{:.3f}",
                       r.source_points,
                       r.correspondences,
                       r.inlier_ratio,
                       r.overlap,
+                      r.support,
                       r.rms_residual_m,
                       r.iterations,
                       r.degenerate_directions,

@@ -45,7 +45,7 @@ struct KeyframeConfig {
   double max_distance_m = 2.0;
   double max_angle_deg = 20.0;
   double min_overlap = 0.8;
-  double wait_overlap = 0.6;
+  double wait_support = 0.85;
   double overlap_distance_m = 0.6;
   int max_scans = 20;
 
@@ -58,10 +58,11 @@ struct KeyframeConfig {
             c.min_overlap,
             Range{0.0, 1.0},
             "... or when less than this share of the scan is near the map");
-    v.Field("wait_overlap",
-            c.wait_overlap,
+    v.Field("wait_support",
+            c.wait_support,
             Range{0.0, 1.0},
-            "... and below this share tracking waits for the keyframes on their way to the map");
+            "tracking waits for keyframes on their way to the map while a scan has less than this "
+            "share of the inliers that scans lately had");
     v.Field("overlap_distance_m",
             c.overlap_distance_m,
             Range{0.01, 10.0},

@@ -19,14 +19,15 @@ Mapper::Mapper(std::unique_ptr<SplatEngine> engine,
 void Mapper::Insert(const Keyframe& keyframe) {
   const ScopedTimer timer(times_, "insert");
   const SE3& T_map_sensor = keyframe.tracked.T_map_sensor;
+  NearGaussians near = map_.Near(T_map_sensor, sensor_.MaxRange());
+  const PatchFit fit = FitPatches(keyframe, near.discs, sensor_, config_.spawn, pool_);
+  std::vector<std::size_t> replaced;
+  for (const std::size_t i : fit.replaced) replaced.push_back(near.row[i]);
+  if (map_.Remove(replaced) > 0) near = map_.Near(T_map_sensor, sensor_.MaxRange());
   std::optional<RenderOutput> render;
   if (map_.Keyframes() > 0) render = Render(T_map_sensor);
-  const NearGaussians near = map_.Near(T_map_sensor, sensor_.MaxRange());
   const SpawnedGaussians spawned = SpawnGaussians(
-      keyframe, render ? &*render : nullptr, near.discs, sensor_, config_.spawn, pool_);
-  std::vector<std::size_t> replaced;
-  for (const std::size_t i : spawned.replaced) replaced.push_back(near.row[i]);
-  map_.Remove(replaced);
+      keyframe, fit, render ? &*render : nullptr, near.discs, sensor_, config_.spawn);
   const int number = map_.AddKeyframe(keyframe, spawned);
   map_.MarkSeen(number, keyframe, sensor_);
   map_.PruneSeenThrough(config_.prune_seen_through);

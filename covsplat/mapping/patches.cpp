@@ -75,9 +75,12 @@ double EstimateNoise(const PointGrid& grid, int min_points) {
   return std::sqrt(*middle);
 }
 
+constexpr int kNone = -1;
+
 /// What all blocks have in common.
 struct FitJob {
   const PointGrid* grid;
+  std::span<const Disc> known;  ///< frame of the grid
   const PatchConfig* config;
   double noise_m;    ///< of ranges
   int finest_level;  ///< cells are not halved beyond
@@ -87,7 +90,6 @@ struct FitJob {
 struct BlockFit {
   std::vector<Patch> patches;         ///< frame of the grid
   std::vector<std::uint8_t> renewed;  ///< [code] whether a new patch has the cell
-  bool has_patch = false;             ///< new or known
 };
 
 bool IsFlat(const Plane& plane, const FitJob& job) {
@@ -95,17 +97,19 @@ bool IsFlat(const Plane& plane, const FitJob& job) {
   return plane.variance[2] <= noise_m * noise_m + job.config->flatness_m * job.config->flatness_m;
 }
 
-/// Whether the known Gaussians that pass through most of the measurements were made of about as
-/// many.
+/// Whether the known discs that pass through most of the measurements were made of about as many.
+/// `densest`: [code] of those that pass, or none.
 bool IsKnown(std::span<const PointCell> cells,
              double count,
              double density,
-             std::span<const float> known_density,
-             double renew_factor) {
-  const auto enough = static_cast<float>(density / renew_factor);
+             std::span<const int> densest,
+             const FitJob& job) {
+  const auto enough = static_cast<float>(density / job.config->renew_factor);
   double known = 0.0;
   for (const PointCell& cell : cells) {
-    if (known_density[static_cast<std::size_t>(cell.code)] > enough) known += cell.moments.count;
+    const int disc = densest[static_cast<std::size_t>(cell.code)];
+    if (disc == kNone || job.known[static_cast<std::size_t>(disc)].density <= enough) continue;
+    known += cell.moments.count;
   }
   return known > 0.5 * count;
 }
@@ -125,7 +129,7 @@ Patch PatchOf(const Plane& plane, const Moments& moments, const Eigen::Vector3d&
 void FitCells(std::span<const PointCell> cells,
               int level,
               const Eigen::Vector3d& corner,
-              std::span<const float> known_density,
+              std::span<const int> densest,
               const FitJob& job,
               BlockFit& fit) {
   const bool is_finest = level >= job.finest_level;
@@ -137,17 +141,14 @@ void FitCells(std::span<const PointCell> cells,
   const Plane plane = PlaneOf(moments);
   const bool has_extent = plane.variance[1] > min_spread_m * min_spread_m;
   if (has_extent && (is_finest || IsFlat(plane, job))) {
-    fit.has_patch = true;
-    if (IsKnown(cells, moments.count, plane.density, known_density, job.config->renew_factor)) {
-      return;
-    }
+    if (IsKnown(cells, moments.count, plane.density, densest, job)) return;
     fit.patches.push_back(PatchOf(plane, moments, corner));
     for (const PointCell& cell : cells) fit.renewed[static_cast<std::size_t>(cell.code)] = 1;
     return;
   }
   if (is_finest) return;
   ForEighths(cells, job.grid->Levels() - level - 1, [&](auto eighth) {
-    FitCells(eighth, level + 1, corner, known_density, job, fit);
+    FitCells(eighth, level + 1, corner, densest, job, fit);
   });
 }
 
@@ -174,23 +175,29 @@ void ForPlacesOf(const Disc& disc, double edge_sigmas, float finest_m, F&& f) {
   }
 }
 
-/// [block][code] density of the discs that pass through a cell, 0 where none does.
-std::vector<std::vector<float>> DensityOfDiscs(std::span<const Disc> discs_grid,
-                                               const PointGrid& grid,
-                                               double extent_factor) {
-  constexpr float kLeast = 1e-3f;  // of single pixels: something is there
-  std::vector<std::vector<float>> density(
-      grid.Blocks(), std::vector<float>(static_cast<std::size_t>(grid.CellsPerBlock()), 0.0f));
+/// [block][code] indices of discs, or none.
+using DiscsOfCells = std::vector<std::vector<int>>;
+
+/// The densest of the discs that pass through each cell.
+DiscsOfCells DensestDiscs(std::span<const Disc> discs_grid,
+                          const PointGrid& grid,
+                          double extent_factor) {
+  DiscsOfCells densest(grid.Blocks(),
+                       std::vector<int>(static_cast<std::size_t>(grid.CellsPerBlock()), kNone));
   const auto finest_m = static_cast<float>(grid.CellSize(grid.Levels()));
-  for (const Disc& disc : discs_grid) {
-    ForPlacesOf(disc, kEdgeSigmas / extent_factor, finest_m, [&](const Eigen::Vector3f& p) {
+  for (std::size_t i = 0; i < discs_grid.size(); ++i) {
+    const auto mark = [&](const Eigen::Vector3f& p) {
       const std::optional<PointGrid::Place> place = grid.Find(p);
       if (!place) return;
-      float& known = density[place->block][static_cast<std::size_t>(place->code)];
-      known = std::max({known, disc.density, kLeast});
-    });
+      int& known = densest[place->block][static_cast<std::size_t>(place->code)];
+      const bool is_denser =
+          known == kNone ||
+          discs_grid[i].density > discs_grid[static_cast<std::size_t>(known)].density;
+      if (is_denser) known = static_cast<int>(i);
+    };
+    ForPlacesOf(discs_grid[i], kEdgeSigmas / extent_factor, finest_m, mark);
   }
-  return density;
+  return densest;
 }
 
 std::vector<Disc> Moved(const SE3& T_to_from, std::span<const Disc> discs) {
@@ -212,12 +219,37 @@ Patch Moved(const SE3& T_to_from, Patch patch) {
   return patch;
 }
 
-FitJob MakeJob(const PointGrid& grid, const PatchConfig& config) {
-  FitJob job{&grid, &config, EstimateNoise(grid, config.min_points), config.levels};
+FitJob MakeJob(const PointGrid& grid, std::span<const Disc> known, const PatchConfig& config) {
+  FitJob job{&grid, known, &config, EstimateNoise(grid, config.min_points), config.levels};
   while (job.finest_level > 0 && grid.CellSize(job.finest_level) < kMinCellInNoise * job.noise_m) {
     --job.finest_level;
   }
   return job;
+}
+
+bool IsRenewed(const PointGrid::Place& place, const std::vector<BlockFit>& fits) {
+  return fits[place.block].renewed[static_cast<std::size_t>(place.code)] != 0;
+}
+
+/// [known] whether a disc's middle is not in a new patch's cell.
+std::vector<std::uint8_t> WhichStay(std::span<const Disc> discs_grid,
+                                    const PointGrid& grid,
+                                    const std::vector<BlockFit>& fits) {
+  std::vector<std::uint8_t> stays;
+  stays.reserve(discs_grid.size());
+  for (const Disc& disc : discs_grid) {
+    const std::optional<PointGrid::Place> place = grid.Find(disc.mean);
+    stays.push_back(!place || !IsRenewed(*place, fits));
+  }
+  return stays;
+}
+
+bool IsCovered(const PointGrid::Place& place,
+               const std::vector<BlockFit>& fits,
+               const DiscsOfCells& densest,
+               const std::vector<std::uint8_t>& stays) {
+  const int disc = densest[place.block][static_cast<std::size_t>(place.code)];
+  return IsRenewed(place, fits) || (disc != kNone && stays[static_cast<std::size_t>(disc)] != 0);
 }
 
 }  // namespace
@@ -232,13 +264,13 @@ PatchFit FitPatches(std::span<const PosedPoints> scans,
   const PointGrid grid(scans, sensor, config.cell_m, config.levels, pool);
   const SE3 T_grid_sensor = grid.FromMap() * scans.back().T_map_sensor;
   const std::vector<Disc> discs_grid = Moved(T_grid_sensor, known);
-  const auto known_density = DensityOfDiscs(discs_grid, grid, config.extent_factor);
-  const FitJob job = MakeJob(grid, config);
+  const DiscsOfCells densest = DensestDiscs(discs_grid, grid, config.extent_factor);
+  const FitJob job = MakeJob(grid, discs_grid, config);
   std::vector<BlockFit> fits(grid.Blocks());
   ParallelFor(pool, grid.Blocks(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) {
       fits[b].renewed.assign(static_cast<std::size_t>(grid.CellsPerBlock()), 0);
-      FitCells(grid.Cells(b), 0, grid.Corner(b), known_density[b], job, fits[b]);
+      FitCells(grid.Cells(b), 0, grid.Corner(b), densest[b], job, fits[b]);
     }
   });
 
@@ -246,14 +278,16 @@ PatchFit FitPatches(std::span<const PosedPoints> scans,
   for (const BlockFit& fit : fits) {
     for (const Patch& patch : fit.patches) result.patches.push_back(Moved(T_sensor_grid, patch));
   }
-  for (const int block : grid.BlocksOfLastScan()) {
-    result.has_patch.push_back(block >= 0 && fits[static_cast<std::size_t>(block)].has_patch);
+  const std::vector<std::uint8_t> stays = WhichStay(discs_grid, grid, fits);
+  for (std::size_t i = 0; i < stays.size(); ++i) {
+    if (stays[i] == 0) result.replaced.push_back(i);
   }
-  for (std::size_t i = 0; i < discs_grid.size(); ++i) {
-    const std::optional<PointGrid::Place> place = grid.Find(discs_grid[i].mean);
-    if (!place) continue;
-    const BlockFit& fit = fits[place->block];
-    if (fit.renewed[static_cast<std::size_t>(place->code)] != 0) result.replaced.push_back(i);
+  const Eigen::Matrix3f rotation = T_grid_sensor.RotationMatrix().cast<float>();
+  const Eigen::Vector3f translation = T_grid_sensor.Translation().cast<float>();
+  for (const Eigen::Vector3f& p : scans.back().points) {
+    const std::optional<PointGrid::Place> place =
+        p.allFinite() ? grid.Find(rotation * p + translation) : std::nullopt;
+    result.covered.push_back(place && IsCovered(*place, fits, densest, stays));
   }
   return result;
 }

@@ -65,8 +65,8 @@ struct Patch {
 
 struct PatchFit {
   std::vector<Patch> patches;
-  /// [points of the last scan] whether there are patches, new or known, in its largest cell.
-  std::vector<std::uint8_t> has_patch;
+  /// [points of the last scan] whether a new patch, or a disc that stays, passes where they are.
+  std::vector<std::uint8_t> covered;
   std::vector<std::size_t> replaced;  ///< which of the known discs give way to patches
 };
 

@@ -120,8 +120,6 @@ PointGrid::Sorted PointGrid::SortIntoBlocks(std::span<const PosedPoints> scans,
     if (block_of[i] < 0) continue;
     sorted.points[next[static_cast<std::size_t>(block_of[i])]++] = points[i];
   }
-  const std::size_t last = scans.back().points.size();
-  blocks_of_last_.assign(block_of.end() - static_cast<std::ptrdiff_t>(last), block_of.end());
   return sorted;
 }
 

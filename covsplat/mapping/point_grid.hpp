@@ -70,10 +70,8 @@ class PointGrid {
     return block_m_ * index_of_[block].cast<double>();
   }
 
-  /// Nothing where no block holds measurements.
+  /// Nothing where no block holds measurements. The position has to be finite.
   std::optional<Place> Find(const Eigen::Vector3f& p_grid) const;
-  /// [points of the last scan] their blocks, -1 of those left out.
-  std::span<const int> BlocksOfLastScan() const { return blocks_of_last_; }
 
  private:
   struct Sorted;
@@ -87,7 +85,6 @@ class PointGrid {
   VoxelHash block_at_{0};
   std::vector<Eigen::Vector3i> index_of_;      ///< [B]
   std::vector<std::vector<PointCell>> cells_;  ///< [B] by code
-  std::vector<int> blocks_of_last_;
 };
 
 }  // namespace covsplat

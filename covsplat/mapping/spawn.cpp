@@ -36,18 +36,17 @@ bool IsExplained(const Keyframe& keyframe,
 
 /// Foliage, edges and points in mid-air make poor discs: they are left to patches.
 bool IsFlat(const PointCovariance& covariance) {
-  constexpr float kMaxThicknessM = 0.05f;
   constexpr float kMaxThicknessShare = 0.3f;
   const Eigen::Vector3f& sigma = covariance.sigma_m;
-  return sigma[2] < kMaxThicknessM && sigma[2] < kMaxThicknessShare * sigma[1];
+  return sigma[2] < kMaxThicknessShare * sigma[1];
 }
 
-/// Unexplained pixels on a known surface that no patch has, at most one per voxel that is still
-/// empty. `has_patch`: of the keyframe's points, or empty.
+/// Unexplained pixels on a known surface where no patch passes, at most one per voxel that is still
+/// empty. `covered`: of the keyframe's points, or empty if there are no patches.
 std::vector<Site> ChooseSites(const Keyframe& keyframe,
                               const RenderOutput* render,
                               std::span<const Disc> existing_sensor,
-                              std::span<const std::uint8_t> has_patch,
+                              std::span<const std::uint8_t> covered,
                               const SpawnConfig& config) {
   const auto cells_per_m = static_cast<float>(1.0 / config.voxel_m);
   VoxelHash taken(keyframe.point.Size() + existing_sensor.size());
@@ -60,9 +59,9 @@ std::vector<Site> ChooseSites(const Keyframe& keyframe,
       if (keyframe.surface(row, column) < 0) continue;
       if (IsExplained(keyframe, render, {row, column}, config)) continue;
       const auto point = static_cast<std::size_t>(keyframe.point(row, column));
-      if (!has_patch.empty()) {
+      if (!covered.empty()) {
         const auto surface = static_cast<std::size_t>(keyframe.surface(row, column));
-        if (has_patch[point] != 0 || !IsFlat(keyframe.tracked.covariance[surface])) continue;
+        if (covered[point] != 0 || !IsFlat(keyframe.tracked.covariance[surface])) continue;
       }
       const Eigen::Vector3i cell = CellOf(cells_per_m * keyframe.tracked.points[point]);
       if (taken.Find(cell) >= 0) continue;
@@ -235,21 +234,25 @@ std::vector<PosedPoints> WithSweep(const TrackedScan& tracked) {
 
 }  // namespace
 
+PatchFit FitPatches(const Keyframe& keyframe,
+                    std::span<const Disc> existing_sensor,
+                    const SensorModel& sensor,
+                    const SpawnConfig& config,
+                    ThreadPool& pool) {
+  if (!config.patches.enabled) return {};
+  return FitPatches(WithSweep(keyframe.tracked), existing_sensor, sensor, config.patches, pool);
+}
+
 SpawnedGaussians SpawnGaussians(const Keyframe& keyframe,
+                                const PatchFit& fit,
                                 const RenderOutput* render,
                                 std::span<const Disc> existing_sensor,
                                 const SensorModel& sensor,
-                                const SpawnConfig& config,
-                                ThreadPool& pool) {
+                                const SpawnConfig& config) {
   SpawnedGaussians spawned;
-  PatchFit fit;
-  if (config.patches.enabled) {
-    fit = FitPatches(WithSweep(keyframe.tracked), existing_sensor, sensor, config.patches, pool);
-    spawned.replaced = std::move(fit.replaced);
-    SpawnFromPatches(keyframe, fit.patches, sensor, config, spawned);
-  }
+  SpawnFromPatches(keyframe, fit.patches, sensor, config, spawned);
   const std::vector<Site> sites =
-      ChooseSites(keyframe, render, existing_sensor, fit.has_patch, config);
+      ChooseSites(keyframe, render, existing_sensor, fit.covered, config);
   SpawnFromPixels(keyframe, sites, sensor, config, spawned);
   return spawned;
 }

@@ -81,22 +81,29 @@ struct SpawnConfig {
 /// New Gaussians in the keyframe's frame with the signals that come from tracking.
 struct SpawnedGaussians {
   GaussianColumns<float> gaussians;
-  std::vector<float> confidence;      ///< [N] u
-  std::vector<float> control_score;   ///< [N] c, NaN where unknown
-  std::vector<float> density;         ///< [N] measurements per m2, 0 of single pixels
-  std::vector<std::size_t> replaced;  ///< which of the existing Gaussians give way to them
+  std::vector<float> confidence;     ///< [N] u
+  std::vector<float> control_score;  ///< [N] c, NaN where unknown
+  std::vector<float> density;        ///< [N] measurements per m2, 0 of single pixels
 };
 
-/// Patches through all scans since the last keyframe where they lie dense enough; elsewhere the
-/// keyframe's own pixels with the covariances that tracking has of them. `render`: the map from the
-/// keyframe's pose; nothing for the first keyframe. `existing_sensor`: the map's Gaussians around
-/// it. Where a disc passes there is no second patch, and a voxel that has a mean gets no second
+/// Patches through all scans since the last keyframe where they lie dense enough; nothing if
+/// patches are off. `existing_sensor`: the map's Gaussians around the keyframe, in its frame; those
+/// that the fit says it replaces should go before anything is spawned.
+PatchFit FitPatches(const Keyframe& keyframe,
+                    std::span<const Disc> existing_sensor,
+                    const SensorModel& sensor,
+                    const SpawnConfig& config,
+                    ThreadPool& pool);
+
+/// A Gaussian per patch, and elsewhere the keyframe's own pixels with the covariances that tracking
+/// has of them. `render`: the map from the keyframe's pose; nothing for the first keyframe.
+/// `existing_sensor`: as above, without what was replaced. A voxel that has a mean gets no second
 /// pixel, however badly it is explained (edges and foliage never are).
 SpawnedGaussians SpawnGaussians(const Keyframe& keyframe,
+                                const PatchFit& fit,
                                 const RenderOutput* render,
                                 std::span<const Disc> existing_sensor,
                                 const SensorModel& sensor,
-                                const SpawnConfig& config,
-                                ThreadPool& pool);
+                                const SpawnConfig& config);
 
 }  // namespace covsplat

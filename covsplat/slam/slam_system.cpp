@@ -33,6 +33,7 @@ ScanRecord MakeRecord(const TrackResult& result) {
   record.correspondences = result.align.correspondences;
   record.inlier_ratio = result.align.inlier_ratio;
   record.overlap = result.overlap;
+  record.support = result.support;
   record.rms_residual_m = result.align.rms_residual_m;
   record.iterations = result.align.iterations;
   record.degenerate_directions = result.align.degenerate_directions;
@@ -100,7 +101,7 @@ std::optional<ScanRecord> SlamSystem::Process(const Scan& scan) {
   } else if (!MaybeHoldOut(*result)) {
     AddToSweep(*result);
   }
-  WaitForMap(record.overlap, record.times);
+  WaitForMap(record.support, record.times);
   record.gaussians = gaussians_;
   record.mapper_steps = mapper_steps_;
   ++scans_;
@@ -120,11 +121,11 @@ void SlamSystem::HandOver(TrackedScan keyframe, StageTimes* times) {
   target_.WaitFor([](const RegistrationTarget&) { return true; });
 }
 
-// A scan that has all but left the map is followed by one that is lost, unless the keyframes that
-// are on their way to the mapper are waited for.
-void SlamSystem::WaitForMap(double overlap, StageTimes& times) {
+// Scans that leave the map are followed by one that is tracked badly or lost, unless the keyframes
+// that are on their way to the mapper are waited for.
+void SlamSystem::WaitForMap(double support, StageTimes& times) {
   if (config_.system.schedule == Schedule::kLockstep || keyframe_scans_.empty()) return;
-  if (overlap >= config_.tracker.keyframe.wait_overlap) return;
+  if (support >= config_.tracker.keyframe.wait_support) return;
   const ScopedTimer timer(times, "wait");
   const auto all = static_cast<int>(keyframe_scans_.size());
   target_.WaitFor([&](const RegistrationTarget& target) { return target.Keyframes() >= all; });
@@ -151,9 +152,9 @@ void SlamSystem::MapKeyframe(TrackedScan tracked, StageTimes& times) {
 }
 
 void SlamSystem::PublishTarget() {
-  target_.Publish(mapper_.MakeTarget(T_map_newest_));
   gaussians_ = mapper_.Map().Size();
   mapper_steps_ = mapper_.Steps();
+  target_.Publish(mapper_.MakeTarget(T_map_newest_));
 }
 
 void SlamSystem::MapperLoop() {

@@ -25,6 +25,7 @@ struct ScanRecord {
   std::size_t correspondences = 0;
   double inlier_ratio = 0.0;
   double overlap = 0.0;
+  double support = 1.0;
   double rms_residual_m = 0.0;
   int iterations = 0;
   int degenerate_directions = 0;
@@ -77,7 +78,7 @@ class SlamSystem {
              std::unique_ptr<SplatEngine> engine);
 
   void HandOver(TrackedScan keyframe, StageTimes* times);
-  void WaitForMap(double overlap, StageTimes& times);
+  void WaitForMap(double support, StageTimes& times);
   void MapKeyframe(TrackedScan keyframe, StageTimes& times);
   void MapperLoop();
   void PublishTarget();

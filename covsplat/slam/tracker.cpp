@@ -12,6 +12,9 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr int kBootstrapRounds = 3;
 constexpr double kMaxPoseGapS = 0.5;
+// Per scan, of the inlier ratio that is usual and of the best.
+constexpr double kForget = 0.1;
+constexpr double kForgetBest = 0.01;
 constexpr std::size_t kSearchPoints = 1500;
 constexpr int kSearchIterations = 20;
 
@@ -281,10 +284,13 @@ void Tracker::Conclude(const Scan& scan,
   }
   last_tracked_s_ = last_stamp_s_;
   motion_covariance_ = result.align.covariance;
-  constexpr double kForget = 0.1;
   const double ratio = result.align.inlier_ratio;
   usual_inlier_ratio_ +=
       (usual_inlier_ratio_ > 0.0 ? kForget : 1.0) * (ratio - usual_inlier_ratio_);
+  best_inlier_ratio_ += kForgetBest * (ratio - best_inlier_ratio_);
+  best_inlier_ratio_ = std::max(best_inlier_ratio_, ratio);
+  // Of given poses no inliers are known.
+  if (best_inlier_ratio_ > 0.0) result.support = ratio / best_inlier_ratio_;
   result.is_keyframe = WantsKeyframe(result);
   if (result.is_keyframe) CountKeyframe(motion.T_map_sensor);
 }

@@ -70,6 +70,7 @@ struct TrackResult {
   TrackedScan tracked;  ///< pose (a prediction when lost) and deskewed points
   AlignResult align;    ///< empty unless registered
   double overlap = 0.0;
+  double support = 1.0;       ///< inliers as a share of the most that scans had lately
   int keyframes_waiting = 0;  ///< keyframes before this scan that the target did not hold yet
   bool is_keyframe = false;
   /// With the second usable scan: the first one again, deskewed with the motion found meanwhile.
@@ -150,6 +151,7 @@ class Tracker {
   int scans_since_keyframe_ = 0;
   int keyframes_ = 0;
   double usual_inlier_ratio_ = 0.0;  ///< mean over the last tracked scans
+  double best_inlier_ratio_ = 0.0;   ///< highest, slowly forgotten
 };
 
 }  // namespace covsplat

@@ -75,7 +75,7 @@ TEST_F(PatchesTest, OfAFlatWallAreAsLargeAsTheirCells) {
     EXPECT_LE(patch.sigma_m[0], 0.8 / std::sqrt(12.0) + 0.01);
   }
   EXPECT_TRUE(
-      std::all_of(fit.has_patch.begin(), fit.has_patch.end(), [](auto has) { return has; }));
+      std::all_of(fit.covered.begin(), fit.covered.end(), [](auto covered) { return covered; }));
 }
 
 TEST_F(PatchesTest, KnowTheDensityOfTheirMeasurements) {
@@ -119,8 +119,42 @@ TEST_F(PatchesTest, AreNotSpawnedTwice) {
   const PatchFit again = Fit({Wall(20000, 2)}, DiscsOf(first));
   EXPECT_TRUE(again.patches.empty());
   EXPECT_TRUE(again.replaced.empty());
-  EXPECT_TRUE(
-      std::all_of(again.has_patch.begin(), again.has_patch.end(), [](auto has) { return has; }));
+  // Discs are taken to end a little within their edges.
+  EXPECT_GT(std::count(again.covered.begin(), again.covered.end(), 1), 19000);
+}
+
+TEST_F(PatchesTest, LeaveSparseMeasurementsUncoveredHoweverNear) {
+  // One cell of 0.8 m: dense in one half, two measurements in the other, off its plane.
+  SweptScan scan;
+  Rng rng(1);
+  for (int i = 0; i < 300; ++i) {
+    scan.points.push_back(
+        Eigen::Vector3d(5.2, 0.05 + 0.3 * rng.Uniform(), 0.7 * rng.Uniform() + 0.05).cast<float>());
+  }
+  scan.points.emplace_back(5.5f, 0.6f, 0.2f);
+  scan.points.emplace_back(5.5f, 0.7f, 0.6f);
+  const PatchFit fit = Fit({scan});
+  EXPECT_FALSE(fit.patches.empty());
+  EXPECT_EQ(fit.covered.front(), 1);
+  EXPECT_EQ(fit.covered[300], 0);
+  EXPECT_EQ(fit.covered[301], 0);
+}
+
+TEST_F(PatchesTest, DoNotCoverWhatOnlyReplacedDiscsCovered) {
+  // A large disc reaches beyond the dense patch that replaces it.
+  SweptScan scan;
+  Rng rng(1);
+  for (int i = 0; i < 3000; ++i) {
+    scan.points.push_back(
+        Eigen::Vector3d(5.2, 0.02 + 0.36 * rng.Uniform(), 0.02 + 0.36 * rng.Uniform())
+            .cast<float>());
+  }
+  scan.points.emplace_back(5.2f, 1.0f, 0.2f);
+  const auto disc = [](float y, float density) {
+    return Disc{{5.2f, y, 0.2f}, {0, 0.8f, 0}, {0, 0, 0.3f}, density};
+  };
+  EXPECT_EQ(Fit({scan}, {disc(0.2f, 1.0f)}).covered.back(), 0);  // sparse: it goes
+  EXPECT_EQ(Fit({scan}, {disc(0.9f, 1.0f)}).covered.back(), 1);  // its middle is elsewhere
 }
 
 TEST_F(PatchesTest, ReplaceThoseOfFarFewerMeasurements) {
@@ -180,8 +214,8 @@ TEST_F(PatchesTest, LeaveOutWhatIsNoMeasurement) {
   }
   const PatchFit fit = Fit({scan});
   EXPECT_EQ(fit.patches.size(), patches);
-  EXPECT_EQ(fit.has_patch.size(), scan.points.size());
-  EXPECT_EQ(fit.has_patch.back(), 0);
+  EXPECT_EQ(fit.covered.size(), scan.points.size());
+  EXPECT_EQ(fit.covered.back(), 0);
 }
 
 TEST_F(PatchesTest, DoNotTakeForeverOverAGiantDisc) {

@@ -94,7 +94,15 @@ SpawnConfig WithoutSmoothing() {
 class SpawnGaussiansTest : public ::testing::Test {
  protected:
   SpawnedGaussians Spawn(const Keyframe& keyframe, const SpawnConfig& config = FromPixels()) {
-    return SpawnGaussians(keyframe, nullptr, {}, sensor_, config, pool_);
+    const PatchFit fit = FitPatches(keyframe, {}, sensor_, config, pool_);
+    return SpawnGaussians(keyframe, fit, nullptr, {}, sensor_, config);
+  }
+  /// From pixels, into a map that has something there.
+  SpawnedGaussians SpawnMore(const Keyframe& keyframe,
+                             const RenderOutput* render,
+                             const std::vector<Disc>& existing,
+                             const SpawnConfig& config = FromPixels()) {
+    return SpawnGaussians(keyframe, {}, render, existing, sensor_, config);
   }
   std::vector<Disc> Existing(const GaussianMap& map, const SE3& T_map_sensor) {
     return map.Near(T_map_sensor, sensor_.MaxRange()).discs;
@@ -167,8 +175,7 @@ TEST_F(SpawnGaussiansTest, CoverARoomOnceAndNotTwice) {
   const SpawnedGaussians all = Spawn(first);
   map.AddKeyframe(first, all);
   const RenderOutput render = map.Engine().Render(pose);
-  const SpawnedGaussians more =
-      SpawnGaussians(again, &render, Existing(map, pose), sensor_, FromPixels(), pool_);
+  const SpawnedGaussians more = SpawnMore(again, &render, Existing(map, pose));
   EXPECT_LT(more.gaussians.Size(), 0.05 * static_cast<double>(all.gaussians.Size()));
 }
 
@@ -178,7 +185,7 @@ TEST_F(SpawnGaussiansTest, LeaveOccupiedVoxelsAloneHoweverBadlyTheyAreExplained)
   config.voxel_m = 0.2;
   const auto spawned_beside = [&](const Eigen::Vector3f& mean) {
     const std::vector<Disc> one = {{mean, {0, 0.1f, 0}, {0, 0, 0.1f}, 0.0f}};
-    return SpawnGaussians(keyframe, nullptr, one, sensor_, config, pool_).gaussians.Size();
+    return SpawnMore(keyframe, nullptr, one, config).gaussians.Size();
   };
   EXPECT_EQ(spawned_beside({5.15f, 0.15f, 0.15f}), 0u);  // in its voxel
   EXPECT_EQ(spawned_beside({5.25f, 0.15f, 0.15f}), 1u);  // in the next
@@ -195,8 +202,7 @@ TEST_F(SpawnGaussiansTest, CoverWhatHasAppearedAndNothingElse) {
   furnished.Add(cupboard);
   const Keyframe after = StillKeyframe(furnished, sensor_, SE3(), kNoise, 2, pool_);
   const RenderOutput render = map.Engine().Render(SE3());
-  const SpawnedGaussians fresh =
-      SpawnGaussians(after, &render, Existing(map, SE3()), sensor_, FromPixels(), pool_);
+  const SpawnedGaussians fresh = SpawnMore(after, &render, Existing(map, SE3()));
   std::size_t on_the_cupboard = 0;
   for (std::size_t i = 0; i < fresh.gaussians.Size(); ++i) {
     const Triple mean = TripleOf(fresh.gaussians, i);
@@ -313,17 +319,21 @@ Keyframe WithSweep(const RayScene& scene, const SensorModel& sensor, ThreadPool&
 TEST_F(SpawnGaussiansTest, OfPatchesLieCloserToTheSurfaceThanPixels) {
   const Keyframe keyframe = WithSweep(Room(), sensor_, pool_);
   const auto rim_error = [&](const SpawnConfig& config) {
-    const GaussianColumns<float> table = Spawn(keyframe, config).gaussians;
+    const SpawnedGaussians spawned = Spawn(keyframe, config);
+    const GaussianColumns<float>& table = spawned.gaussians;
     double sum = 0.0;
+    double count = 0.0;
     for (std::size_t i = 0; i < table.Size(); ++i) {
+      if (config.patches.enabled && spawned.density[i] == 0.0f) continue;
       const Triple m = TripleOf(table, i);
       const Eigen::Vector3d rim =
           Eigen::Vector3f(Eigen::Vector3f(m[0], m[1], m[2]) +
                           static_cast<float>(ScaleOf(table, i, 0)) * AxesOf(table, i).col(0))
               .cast<double>();
       sum += std::abs(Room().Cast(Eigen::Vector3d::Zero(), rim.normalized()) - rim.norm());
+      count += 1.0;
     }
-    return sum / static_cast<double>(table.Size());
+    return sum / count;
   };
   EXPECT_LT(rim_error({}), 0.5 * rim_error(FromPixels()));
 }
@@ -333,12 +343,22 @@ TEST_F(SpawnGaussiansTest, OfPatchesReplaceWhatWasMadeOfLess) {
   GaussianMap map(std::move(MakeSplatEngine(Backend::kCpu, sensor_, {}, pool_).value()));
   map.AddKeyframe(first, Spawn(first));
   const std::size_t before = map.Size();
-  const std::vector<Disc> existing = Existing(map, SE3());
-  const RenderOutput render = map.Engine().Render(SE3());
-  const SpawnedGaussians fresh =
-      SpawnGaussians(WithSweep(Room(), sensor_, pool_), &render, existing, sensor_, {}, pool_);
-  EXPECT_GT(static_cast<double>(fresh.replaced.size()), 0.5 * static_cast<double>(before));
-  EXPECT_LT(fresh.replaced.back(), before);
+  const PatchFit fit = FitPatches(
+      WithSweep(Room(), sensor_, pool_), Existing(map, SE3()), sensor_, SpawnConfig{}, pool_);
+  EXPECT_GT(static_cast<double>(fit.replaced.size()), 0.5 * static_cast<double>(before));
+  EXPECT_LT(fit.replaced.back(), before);
+}
+
+TEST_F(SpawnGaussiansTest, FromPixelsFillTheGapsBetweenPatches) {
+  const Keyframe keyframe = WithSweep(Room(), sensor_, pool_);
+  PatchFit fit = FitPatches(keyframe, {}, sensor_, SpawnConfig{}, pool_);
+  const auto spawned = [&] {
+    return SpawnGaussians(keyframe, fit, nullptr, {}, sensor_, {}).gaussians.Size();
+  };
+  const std::size_t with_gaps = spawned();
+  EXPECT_GT(with_gaps, fit.patches.size());
+  std::fill(fit.covered.begin(), fit.covered.end(), 1);
+  EXPECT_LE(spawned(), fit.patches.size());
 }
 
 TEST_F(SpawnGaussiansTest, OfPatchesAreNotWhereTheKeyframeSeesThrough) {

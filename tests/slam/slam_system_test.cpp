@@ -191,6 +191,29 @@ TEST(SlamSystem, HoldsOutOnlyScansThatAreNotInTheMap) {
   EXPECT_TRUE(RunSlam(config, Walk(kShort)).system->HeldOuts().empty());
 }
 
+/// The share of the keyframes that were in the target of the next scan.
+double ShareWaitedFor(double wait_support) {
+  SlamConfig config = Config(Schedule::kThreaded);
+  config.tracker.keyframe.max_scans = 3;
+  config.tracker.keyframe.wait_support = wait_support;
+  config.mapper.schedule.steps_new = kSanitized ? 20 : 200;  // longer than three scans take
+  const SlamRun run = RunSlam(config, Walk(kShort));
+  int keyframes = 0;
+  int waited = 0;
+  for (std::size_t k = 3; k + 1 < run.records.size(); ++k) {
+    if (!run.records[k].is_keyframe || run.records[k].support >= 1.0) continue;
+    ++keyframes;
+    waited += run.records[k + 1].target_surfels != run.records[k].target_surfels;
+  }
+  EXPECT_GT(keyframes, 0);
+  return static_cast<double>(waited) / std::max(1, keyframes);
+}
+
+TEST(SlamSystem, WaitsForKeyframesWhenScansLoseTheirSupport) {
+  EXPECT_EQ(ShareWaitedFor(1.0), 1.0);
+  EXPECT_LT(ShareWaitedFor(0.0), 0.5);
+}
+
 class BothSchedules : public ::testing::TestWithParam<Schedule> {};
 
 TEST_P(BothSchedules, FinishTwiceIsFinishOnce) {

@@ -362,6 +362,7 @@ TEST_F(KeyframePolicyTest, WantsOneWhereTheMapEnds) {
   TrackFirst(tracker, Still, 2);
   const TrackResult inside = tracker.Track(ScanOf(Still, 2), &map_);
   EXPECT_GT(inside.overlap, 0.8);
+  EXPECT_GT(inside.support, 0.95);
   EXPECT_FALSE(inside.is_keyframe);
   std::vector<TargetSurfel> half;
   const SourceCloud cloud = StillCloud(Room(), SE3(), kNoise, 100, pool_);
@@ -374,6 +375,7 @@ TEST_F(KeyframePolicyTest, WantsOneWhereTheMapEnds) {
   const TrackResult outside = tracker.Track(ScanOf(Still, 3), &front);
   ExpectAt(outside, SE3());
   EXPECT_LT(outside.overlap, 0.8);
+  EXPECT_LT(outside.support, 0.8);
   EXPECT_TRUE(outside.is_keyframe);
   const TrackResult next = tracker.Track(ScanOf(Still, 4), &front);
   EXPECT_LT(next.overlap, 0.8);
@@ -403,6 +405,7 @@ TEST_F(FollowTest, TakesPosesAsGivenAndDeskewsByThem) {
     EXPECT_LT(MedianMisfit(result->tracked.points, Driven(StampOf(k))), 2.0 * kNoise);
     EXPECT_EQ(result->tracked.squared_distance.size(), result->tracked.surface.size());
     EXPECT_GT(result->overlap, 0.8);
+    EXPECT_EQ(result->support, 1.0) << "nothing was registered";
   }
 }
 
