@@ -8,6 +8,9 @@
 #include "apps/exit_code.hpp"
 #include <CLI/CLI.hpp>
 
+#include "covsplat/mesh/mesh_config.hpp"
+#include "covsplat/sim/simulation.hpp"
+
 namespace covsplat {
 namespace {
 
@@ -15,12 +18,20 @@ constexpr const char* kReferenceHead =
     "# Configuration\n\n"
     "Every key with its default. A file given with `-c` holds only what differs; `-s "
     "section.key=value`\n"
-    "sets one value. `covsplat config dump` prints the whole configuration as YAML.\n"
+    "sets one value. `covsplat config dump` prints the whole configuration of a run as YAML.\n"
+    "`mesh` and `simulate` have [keys](#keys-of-covsplat-mesh) [of their "
+    "own](#keys-of-covsplat-simulate).\n"
     "This page is made by `make docs`.\n\n";
 
 int Print(const std::string& text) {
   const bool printed = std::fputs(text.c_str(), stdout) >= 0 && std::fflush(stdout) == 0;
   return printed ? kExitOk : ReportError({ErrorCode::kOutput, "cannot write to standard output"});
+}
+
+std::string Reference() {
+  return kReferenceHead + DescribeConfig(AppConfig()) + "\n# Keys of `covsplat mesh`\n" +
+         DescribeConfig(MeshConfig()) + "\n# Keys of `covsplat simulate`\n" +
+         DescribeConfig(SimulationConfig());
 }
 
 int Dump(const ConfigOptions& options) {
@@ -53,8 +64,7 @@ void AddConfigCommand(CLI::App& app, int& exit_code) {
   check->callback([options, &exit_code] { exit_code = Check(*options); });
 
   CLI::App* describe = config->add_subcommand("describe", "Print the reference of all keys");
-  describe->callback(
-      [&exit_code] { exit_code = Print(kReferenceHead + DescribeConfig(AppConfig())); });
+  describe->callback([&exit_code] { exit_code = Print(Reference()); });
 }
 
 }  // namespace covsplat

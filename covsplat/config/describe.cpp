@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -29,20 +31,42 @@ std::string Row(const ConfigEntry& field) {
                      Cell(field.doc));
 }
 
+struct Section {
+  std::string path;
+  std::string doc;
+  std::string rows;
+};
+
+/// Fields may come after sections within their own.
+Section& SectionOf(const ConfigEntry& field, std::vector<Section>& sections) {
+  const std::size_t dot = field.path.rfind('.');
+  const std::string path = dot == std::string::npos ? "" : field.path.substr(0, dot);
+  return *std::find_if(
+      sections.begin(), sections.end(), [&](const Section& s) { return s.path == path; });
+}
+
+std::string Text(const Section& section, bool is_first) {
+  std::string text;
+  if (!section.path.empty()) {
+    text += fmt::format("{}## `{}`\n", is_first ? "" : "\n", section.path);
+    if (!section.doc.empty()) text += fmt::format("\n{}\n", section.doc);
+  }
+  return section.rows.empty() ? text : text + kTableHead + section.rows;
+}
+
 }  // namespace
 
 std::string DescribeConfig(const ConfigSchema& schema) {
-  std::string text;
-  bool in_table = false;
+  std::vector<Section> sections = {{"", "", ""}};
   for (const ConfigEntry& entry : schema) {
     if (entry.IsSection()) {
-      text += fmt::format("{}## `{}`\n", text.empty() ? "" : "\n", entry.path);
-      if (!entry.doc.empty()) text += fmt::format("\n{}\n", entry.doc);
+      sections.push_back({entry.path, entry.doc, ""});
     } else {
-      text += in_table ? Row(entry) : kTableHead + Row(entry);
+      SectionOf(entry, sections).rows += Row(entry);
     }
-    in_table = !entry.IsSection();
   }
+  std::string text;
+  for (const Section& section : sections) text += Text(section, text.empty());
   return text;
 }
 

@@ -44,6 +44,11 @@ bool IsJump(const DepthPixel& here,
   return std::abs(off) > tolerance_m;
 }
 
+float WeightAt(float range_m, const ViewConfig& config) {
+  const float ratio = range_m / static_cast<float>(config.half_weight_range_m);
+  return 1.0f / (1.0f + ratio * ratio);
+}
+
 }  // namespace
 
 ViewCamera::ViewCamera(const ViewConfig& config)
@@ -116,7 +121,7 @@ DepthView MakeDepthView(const ViewCamera& camera,
         mixed = mixed || jumps_to(i, j + 1 < columns ? j + 1 : 0) ||
                 jumps_to(i, j > 0 ? j - 1 : columns - 1) || (i > 0 && jumps_to(i - 1, j)) ||
                 (i + 1 < rows && jumps_to(i + 1, j));
-        pixel.weight = cosine * (mixed ? kMixedWeight : 1.0f);
+        pixel.weight = cosine * (mixed ? kMixedWeight : 1.0f) * WeightAt(pixel.range_m, config);
       }
     }
   });

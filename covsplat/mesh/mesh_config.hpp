@@ -12,7 +12,8 @@ struct ViewConfig {
   double lowest_deg = -75.0;
   double highest_deg = 75.0;
   double max_range_m = 30.0;
-  double min_alpha = 0.5;
+  double half_weight_range_m = 10.0;
+  double min_alpha = 0.7;
   double max_disagreement = 0.05;
 
   template <class Self, class V>
@@ -32,6 +33,11 @@ struct ViewConfig {
             c.max_range_m,
             Range{1.0, 1000.0},
             "surfaces farther than this from a view are left to nearer views");
+    v.Field("half_weight_range_m",
+            c.half_weight_range_m,
+            Range{0.1, 1e6},
+            "a surface at this range counts half of one right before the view: far discs are "
+            "smaller than pixels, which draws them towards the view");
     v.Field("min_alpha",
             c.min_alpha,
             Range{0.01, 0.999},
@@ -51,7 +57,7 @@ struct MeshConfig {
   double min_weight = 0.1;
   double surfel_weight = 3.0;
   double sharpness = 0.9;
-  double min_component_m2 = 0.1;
+  double min_component_m2 = 0.02;
   int max_tile_blocks = 40000;
   int threads = 0;
   ViewConfig view;
@@ -71,10 +77,11 @@ struct MeshConfig {
             Range{1e-3, 1e6},
             "voxels that were observed with less than this have no surface: a head-on view of an "
             "opaque surface counts 1");
-    v.Field("surfel_weight",
-            c.surfel_weight,
-            Range{0.0, 1e3},
-            "what a Gaussian's own disc counts in its middle, beside the views; 0: views alone");
+    v.Field(
+        "surfel_weight",
+        c.surfel_weight,
+        Range{0.0, 1e3},
+        "what the Gaussians' own discs count in their middle, beside the views; 0: views alone");
     v.Field("sharpness",
             c.sharpness,
             Range{0.0, 1.0},

@@ -22,7 +22,6 @@ struct Plane {
 };
 
 struct FusionJob {
-  double weight;  ///< of a disc, in its middle
   double truncation_m;
   double voxel_m;
 };
@@ -64,11 +63,6 @@ std::vector<std::vector<Plane>> PlanesOfBlocks(const SurfelMap& map,
   return planes;
 }
 
-/// Where most views look through, a disc has nothing to say: what it shows has moved on.
-bool IsFree(const Voxel& voxel, float truncation_voxels) {
-  return voxel.distance > 0.7f * truncation_voxels * voxel.weight;
-}
-
 void AddPlane(const Plane& plane,
               const Eigen::Vector3d& position,
               const FusionJob& job,
@@ -81,16 +75,15 @@ void AddPlane(const Plane& plane,
   const double v = plane.v.dot(offset);
   const double square = u * u + v * v;
   if (square > kMaxSquare) return;
-  const auto share = static_cast<float>(job.weight * std::exp(-0.5 * square));
+  const auto share = static_cast<float>(std::exp(-0.5 * square));
   voxel.weight += share;
   voxel.distance += share * static_cast<float>(distance / job.voxel_m);
   voxel.normal += share * plane.normal.cast<float>();
 }
 
-/// Adds a plane to the voxels of a block, which begins at voxel `first`, but for the free ones.
+/// Adds a plane to the voxels of a block, which begins at voxel `first`.
 void FuseIntoBlock(const Plane& plane,
                    const Eigen::Array3i& first,
-                   const std::vector<std::uint8_t>& is_free,
                    const FusionJob& job,
                    std::span<Voxel> voxels) {
   const Eigen::Array3i low = (plane.low - first).max(0);
@@ -99,12 +92,20 @@ void FuseIntoBlock(const Plane& plane,
     for (int y = low.y(); y <= high.y(); ++y) {
       for (int x = low.x(); x <= high.x(); ++x) {
         const Eigen::Array3i index = first + Eigen::Array3i(x, y, z);
-        const auto i = static_cast<std::size_t>(VoxelInBlock(x, y, z));
-        if (is_free[i] != 0) continue;
-        AddPlane(plane, job.voxel_m * index.cast<double>().matrix(), job, voxels[i]);
+        Voxel& voxel = voxels[static_cast<std::size_t>(VoxelInBlock(x, y, z))];
+        AddPlane(plane, job.voxel_m * index.cast<double>().matrix(), job, voxel);
       }
     }
   }
+}
+
+/// Discs that overlap are one surface: together they count no more than one in its middle.
+void AddSurface(const Voxel& surface, float weight, Voxel& voxel) {
+  if (!(surface.weight > 0.0f)) return;
+  const float share = weight / std::max(1.0f, surface.weight);
+  voxel.weight += share * surface.weight;
+  voxel.distance += share * surface.distance;
+  voxel.normal += share * surface.normal;
 }
 
 }  // namespace
@@ -115,17 +116,16 @@ void FuseSurfels(const SurfelMap& map,
                  ThreadPool& pool) {
   if (config.surfel_weight <= 0.0) return;
   const double voxel_m = grid.VoxelSize();
-  const FusionJob job = {config.surfel_weight, config.truncation_voxels * voxel_m, voxel_m};
+  const FusionJob job = {config.truncation_voxels * voxel_m, voxel_m};
   const std::vector<std::vector<Plane>> planes = PlanesOfBlocks(map, grid, job);
   ParallelFor(pool, grid.Size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) {
       const Eigen::Array3i first = kBlockSide * grid.Block(b).array();
-      const std::span<Voxel> voxels = grid.Voxels(b);
-      std::vector<std::uint8_t> is_free(voxels.size());
-      for (std::size_t i = 0; i < voxels.size(); ++i) {
-        is_free[i] = IsFree(voxels[i], static_cast<float>(config.truncation_voxels)) ? 1 : 0;
+      std::vector<Voxel> surface(grid.Voxels(b).size());
+      for (const Plane& plane : planes[b]) FuseIntoBlock(plane, first, job, surface);
+      for (std::size_t i = 0; i < surface.size(); ++i) {
+        AddSurface(surface[i], static_cast<float>(config.surfel_weight), grid.Voxels(b)[i]);
       }
-      for (const Plane& plane : planes[b]) FuseIntoBlock(plane, first, is_free, job, voxels);
     }
   });
 }

@@ -147,5 +147,23 @@ TEST(DescribeConfig, ListsEveryFieldInATableOfItsSection) {
             std::string::npos);
 }
 
+struct LateConfig {
+  ToyConfig toy;
+  int late = 7;
+
+  template <class Self, class V>
+  static void Visit(Self& c, V&& v) {
+    v.Section("toy", c.toy, "");
+    v.Field("late", c.late, Range{0, 9}, "comes after a section");
+  }
+};
+
+TEST(DescribeConfig, ListsFieldsThatComeAfterSectionsInTheTableOfTheirOwn) {
+  const std::string text = DescribeConfig(LateConfig());
+  const std::size_t late = text.find("| `late` |");
+  ASSERT_NE(late, std::string::npos);
+  EXPECT_LT(late, text.find("## `toy`"));
+}
+
 }  // namespace
 }  // namespace covsplat
