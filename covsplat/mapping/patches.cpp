@@ -13,6 +13,8 @@ constexpr double kNoiseWithoutCells = 0.02;
 constexpr double kHeadOn = 0.5;
 /// Smaller cells would cut the noise off, not resolve the surface.
 constexpr double kMinCellInNoise = 4.0;
+/// Least standard deviation of measurements that have an extent, in sizes of their cell.
+constexpr double kMinSpread = 0.1;
 /// Half the side of an evenly filled square, in its standard deviations.
 constexpr double kEdgeSigmas = 1.7320508;
 
@@ -134,10 +136,10 @@ void FitCells(std::span<const PointCell> cells,
               BlockFit& fit) {
   const bool is_finest = level >= job.finest_level;
   const Moments moments = SumOf(cells);
-  // Cells that cannot be halved do with half the measurements and next to no extent.
+  // Cells that cannot be halved do with half the measurements.
   const int min_points = is_finest ? (job.config->min_points + 1) / 2 : job.config->min_points;
   if (moments.count < min_points) return;
-  const double min_spread_m = (is_finest ? 0.02 : 0.1) * job.grid->CellSize(level);
+  const double min_spread_m = kMinSpread * job.grid->CellSize(level);
   const Plane plane = PlaneOf(moments);
   const bool has_extent = plane.variance[1] > min_spread_m * min_spread_m;
   if (has_extent && (is_finest || IsFlat(plane, job))) {

@@ -37,7 +37,9 @@ void FuseVoxel(const FusionJob& job, const Eigen::Vector3f& p_view, Voxel& voxel
   const float reach = 2.0f * job.truncation_m;
   if (in_front < -reach) return;
   float distance = job.truncation_m;
-  if (in_front < reach) {
+  if (in_front >= reach) {
+    if (!job.view->clear.Holds(index / job.camera->Columns())) return;
+  } else {
     distance = pixel.normal.dot(p_view - pixel.range_m * job.rays->Pixels()[i]);
     if (distance <= -job.behind_m) return;
     distance = std::min(distance, job.truncation_m);

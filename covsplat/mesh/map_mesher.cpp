@@ -89,7 +89,8 @@ Result<MeshResult> MeshOfMap(const SurfelMap& map,
     VoxelGrid grid(result.voxel_m, tiles[t].padded);
     for (const SE3& pose : views[t]) {
       const RenderOutput render = (*engine)->Render(pose);
-      FuseView(camera, MakeDepthView(camera, render, pose, config.view, pool), config, grid, pool);
+      const DepthView view = MakeDepthView(camera, render, pose, sensor, config.view, pool);
+      FuseView(camera, view, config, grid, pool);
       ++progress.done;
       if (on_progress && !on_progress(progress)) {
         result.interrupted = true;

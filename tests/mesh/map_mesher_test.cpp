@@ -72,9 +72,10 @@ MeshConfig Config() {
   return config;
 }
 
-Result<MeshResult> Mesh(const SurfelMap& map, const MeshConfig& config) {
-  return MeshOfMap(
-      map, map.T_map_keyframe, Sensor(), Backend::kCpu, RasterConfig(), config, nullptr);
+Result<MeshResult> Mesh(const SurfelMap& map,
+                        const MeshConfig& config,
+                        const SensorModel& sensor = Sensor()) {
+  return MeshOfMap(map, map.T_map_keyframe, sensor, Backend::kCpu, RasterConfig(), config, nullptr);
 }
 
 /// The inside of a box of 4 x 3 x 2 m.
@@ -183,6 +184,27 @@ TEST(MapMesher, WhatOnlyOneViewShowsInFreeSpaceIsCarvedAway) {
         return (v - Eigen::Vector3f(0.5f, 0.0f, 0.0f)).norm() < 0.5f;
       });
   EXPECT_EQ(ghosts, 0);
+}
+
+TEST(MapMesher, NothingIsCarvedAwayWhereTheSensorCannotLook) {
+  // A roof's upper side, seen from above at another time, and something higher: a rendering from
+  // below looks through the roof, whose lower side no scan has seen.
+  std::vector<Disc> discs;
+  const Vector x(0.5, 0.0, 0.0), y(0.0, 0.5, 0.0);
+  Tile(Vector(2.0, 0.0, 2.0), x, y, discs);
+  Tile(Vector(4.0, 0.0, 4.0), 4.0 * y, 4.0 * x, discs);
+  std::vector<SE3> views;
+  for (int i = 0; i < 8; ++i) views.push_back(At(0.1 * i - 0.4, 0.0, 0.0));
+  const SurfelMap map = MapOf(discs, views);
+  const auto roof = [&](double highest_rad) {
+    const SensorModel sensor = UniformSensorModel(64, 512, -0.2, highest_rad, 0.3, 40.0);
+    const TriangleMesh mesh = Mesh(map, Config(), sensor).value().mesh;
+    return std::count_if(mesh.vertices.begin(), mesh.vertices.end(), [](const Eigen::Vector3f& v) {
+      return (v - Eigen::Vector3f(2.0f, 0.0f, 2.0f)).norm() < 0.4f;
+    });
+  };
+  EXPECT_GT(roof(0.2), 50);
+  EXPECT_LT(roof(1.5), roof(0.2) / 2);
 }
 
 TEST(MapMesher, WhatNoViewShowsWellIsKnownFromItsGaussians) {

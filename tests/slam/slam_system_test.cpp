@@ -197,7 +197,7 @@ double ShareWaitedFor(double wait_support) {
   config.tracker.keyframe.max_scans = 3;
   config.tracker.keyframe.wait_support = wait_support;
   config.mapper.schedule.steps_new = kSanitized ? 20 : 200;  // longer than three scans take
-  const SlamRun run = RunSlam(config, Walk(kShort));
+  const SlamRun run = RunSlam(config, Walk(12));
   int keyframes = 0;
   int waited = 0;
   for (std::size_t k = 3; k + 1 < run.records.size(); ++k) {
