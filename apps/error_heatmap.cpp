@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "covsplat/eval/nearest_points.hpp"
+#include "covsplat/core/nearest_points.hpp"
 #include "covsplat/io/output_file.hpp"
 #include "covsplat/io/ply.hpp"
 #include "covsplat/report/colormap.hpp"

@@ -69,6 +69,7 @@ Result<FinishedRun> ReadRun(const fs::path& folder) {
   run.map.keyframe = std::move(saved->keyframe);
   if (const auto fits = CheckKeyframes(run.map, folder); !fits) return Forward(fits);
   run.map.confidence = std::move(saved->confidence);
+  run.map.intensity = std::move(saved->intensity);
   run.broken = DropBroken(run.map);
   if (run.map.Size() > 0) return run;
   return Fail(ErrorCode::kInput,

@@ -12,6 +12,9 @@ find_package(embree 3 REQUIRED)
 find_package(assimp 5.2 REQUIRED)
 find_package(nanoflann 1.4 REQUIRED)
 
+# Only `mesh --method poisson` needs it.
+find_package(Open3D 0.16 QUIET)
+
 find_package(hwy REQUIRED)
 find_package(liblzf REQUIRED)
 if(COVSPLAT_TESTS)

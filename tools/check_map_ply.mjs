@@ -12,7 +12,7 @@ const REQUIRED = [
   "x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity",
   "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
 ];
-const EXPECTED = ["nx", "ny", "nz", "confidence", "control_score", "last_seen"];
+const EXPECTED = ["nx", "ny", "nz", "confidence", "control_score", "intensity", "last_seen"];
 const RENDER_MODE = "SplatRenderMode: 2dgs";
 const SIZES = {
   char: 1, int8: 1, uchar: 1, uint8: 1, short: 2, int16: 2, ushort: 2, uint16: 2,

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that covsplat needs and that are missing; says nothing if none is.
-# usage: tools/setup.sh [--with-dev] [--with-python]
+# usage: tools/setup.sh [--with-dev] [--with-poisson] [--with-python]
 set -euo pipefail
 
 packages=(
@@ -12,8 +12,9 @@ packages=(
 for argument in "$@"; do
   case "$argument" in
     --with-dev) packages+=(clang-format-14 clang-tidy-14) ;;
+    --with-poisson) packages+=(libopen3d-dev) ;;
     --with-python) packages+=(python3-venv libusb-1.0-0 libgl1 libgomp1) ;;  # what Open3D's wheel asks for
-    *) echo "usage: tools/setup.sh [--with-dev] [--with-python]" >&2; exit 2 ;;
+    *) echo "usage: tools/setup.sh [--with-dev] [--with-poisson] [--with-python]" >&2; exit 2 ;;
   esac
 done
 

@@ -24,7 +24,7 @@ struct ExportOptions {
 
 /// PCL's names of normals in PCD; PLY has its own.
 PointTable CloudOf(const SurfelMap& map, double min_opacity, bool pcd) {
-  std::array<std::vector<float>, 8> values;
+  std::array<std::vector<float>, 9> values;
   for (std::size_t i = 0; i < map.Size(); ++i) {
     const float opacity = 1.0f / (1.0f + std::exp(-map.gaussians.Column(kOpacityLogit)[i]));
     if (static_cast<double>(opacity) < min_opacity) continue;
@@ -36,15 +36,17 @@ PointTable CloudOf(const SurfelMap& map, double min_opacity, bool pcd) {
     }
     values[6].push_back(opacity);
     values[7].push_back(map.confidence[i]);
+    values[8].push_back(map.intensity[i]);
   }
-  const std::array<const char*, 8> names = {"x",
+  const std::array<const char*, 9> names = {"x",
                                             "y",
                                             "z",
                                             pcd ? "normal_x" : "nx",
                                             pcd ? "normal_y" : "ny",
                                             pcd ? "normal_z" : "nz",
                                             "opacity",
-                                            "confidence"};
+                                            "confidence",
+                                            "intensity"};
   PointTable table;
   for (std::size_t k = 0; k < names.size(); ++k) {
     table.columns.push_back({names[k], std::move(values[k])});
@@ -102,8 +104,8 @@ void AddExportCommand(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(0.0, 1.0));
   command->add_flag("--quiet", o->quiet, "Print warnings and errors only");
   command->footer(
-      "One point per Gaussian with its normal (to the side it was seen from), opacity and\n"
-      "confidence. The map keeps no intensity.");
+      "One point per Gaussian with its normal (to the side it was seen from), opacity, confidence\n"
+      "and intensity: the mean of what it was made of, 0 if the recording has none.");
   command->callback([o, &exit_code] { exit_code = RunExport(*o); });
 }
 

@@ -14,6 +14,7 @@
 
 #include "covsplat/io/mesh_writer.hpp"
 #include "covsplat/mesh/map_mesher.hpp"
+#include "covsplat/mesh/poisson.hpp"
 #include "covsplat/report/format.hpp"
 
 namespace covsplat {
@@ -21,6 +22,7 @@ namespace {
 
 struct MeshOptions {
   std::string run;
+  std::string method;
   std::string out;
   double voxel_m = 0.0;
   int threads = 0;
@@ -29,7 +31,9 @@ struct MeshOptions {
 };
 
 Result<MeshConfig> ConfigOf(const MeshOptions& options) {
-  Result<MeshConfig> config = ResolveConfig<MeshConfig>(options.config);
+  ConfigOptions all = options.config;
+  if (!options.method.empty()) all.overrides.push_back("method=" + options.method);
+  Result<MeshConfig> config = ResolveConfig<MeshConfig>(all);
   if (!config) return config;
   if (options.voxel_m > 0.0) config->voxel_m = options.voxel_m;
   if (options.threads > 0) config->threads = options.threads;
@@ -45,25 +49,19 @@ void PrintSummary(const MeshResult& result, const std::filesystem::path& out) {
              FormatCount(static_cast<double>(result.mesh.triangles.size())),
              FormatCount(static_cast<double>(result.mesh.vertices.size())),
              FormatBytes(bytes));
-  fmt::print(
-      "            voxels of {} from {} views\n", FormatMetres(result.voxel_m), result.views);
+  const std::string voxels = FormatMetres(result.voxel_m);
+  if (result.views > 0) {
+    fmt::print("            voxels of {} from {} views\n", voxels, result.views);
+  } else {
+    fmt::print("            cells of about {} around the Gaussians\n", voxels);
+  }
 }
 
-ExitCode RunMesh(const MeshOptions& options) {
-  const Result<MeshConfig> config = ConfigOf(options);
-  if (!config) return ReportError(config.error());
-  const std::filesystem::path folder = options.run;
-  const std::filesystem::path out =
-      options.out.empty() ? folder / "mesh.ply" : std::filesystem::path(options.out);
-  if (const auto format = MeshFormatOf(out); !format) return ReportError(format.error());
-  const Result<FinishedRun> run = ReadRun(folder);
-  if (!run) return ReportError(run.error());
-  if (run->broken > 0) {
-    ReportWarning(fmt::format("{} Gaussians that are not finite are left out", run->broken));
-  }
+/// Ctrl-C ends it with nothing written.
+Result<MeshResult> FuseViews(const FinishedRun& run, const MeshConfig& config, bool quiet) {
   const InterruptGuard guard;
   Progress::Options progress_options;
-  progress_options.quiet = options.quiet;
+  progress_options.quiet = quiet;
   Progress progress(progress_options);
   auto last = std::chrono::steady_clock::now();
   const auto on_progress = [&](const MeshProgress& now) {
@@ -79,16 +77,33 @@ ExitCode RunMesh(const MeshOptions& options) {
     progress.Update(status);
     return !Interrupted();
   };
-  const SlamConfig& slam = run->config.slam;
-  const Result<MeshResult> result =
-      MeshOfMap(run->map,
-                ChooseViews(run->map, run->trajectory, config->view.spacing_m),
-                run->sensor,
-                slam.system.backend,
-                slam.mapper.engine.raster,
-                *config,
-                on_progress);
+  const SlamConfig& slam = run.config.slam;
+  Result<MeshResult> result = MeshOfMap(run.map,
+                                        ChooseViews(run.map, run.trajectory, config.view.spacing_m),
+                                        run.sensor,
+                                        slam.system.backend,
+                                        slam.mapper.engine.raster,
+                                        config,
+                                        on_progress);
   progress.Finish();
+  return result;
+}
+
+ExitCode RunMesh(const MeshOptions& options) {
+  const Result<MeshConfig> config = ConfigOf(options);
+  if (!config) return ReportError(config.error());
+  const std::filesystem::path folder = options.run;
+  const std::filesystem::path out =
+      options.out.empty() ? folder / "mesh.ply" : std::filesystem::path(options.out);
+  if (const auto format = MeshFormatOf(out); !format) return ReportError(format.error());
+  const Result<FinishedRun> run = ReadRun(folder);
+  if (!run) return ReportError(run.error());
+  if (run->broken > 0) {
+    ReportWarning(fmt::format("{} Gaussians that are not finite are left out", run->broken));
+  }
+  const Result<MeshResult> result = config->method == MeshMethod::kPoisson
+                                        ? PoissonOfMap(run->map, *config)
+                                        : FuseViews(*run, *config, options.quiet);
   if (!result) return ReportError(result.error());
   if (result->interrupted) return kExitInterrupted;
   if (const auto written = WriteMesh(out, result->mesh); !written) {
@@ -110,6 +125,10 @@ void AddMeshCommand(CLI::App& app, int& exit_code) {
                    options->out,
                    "Mesh to write: .ply, .obj or .glb; default: mesh.ply in the run's folder")
       ->type_name("FILE");
+  mesh->add_option("--method",
+                   options->method,
+                   "fusion (default) or poisson; poisson needs a build with Open3D")
+      ->check(CLI::IsMember({"fusion", "poisson"}));
   mesh->add_option("--voxel", options->voxel_m, "Edge of a voxel in metres; default: from the map")
       ->check(CLI::PositiveNumber);
   AddConfigOptions(*mesh, options->config);

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "covsplat/core/check.hpp"
-#include "covsplat/eval/nearest_points.hpp"
+#include "covsplat/core/nearest_points.hpp"
 
 namespace covsplat {
 namespace {

@@ -25,6 +25,7 @@ void GaussianSignals::Resize(std::size_t size) {
   confidence.resize(size, 0.0f);
   control_score.resize(size, std::numeric_limits<float>::quiet_NaN());
   density.resize(size, 0.0f);
+  intensity.resize(size, 0.0f);
   last_seen.resize(size, -1);
   seen_through.resize(size, 0);
   trackable.resize(size, 0);
@@ -45,6 +46,7 @@ int GaussianMap::AddKeyframe(const Keyframe& keyframe, const SpawnedGaussians& s
     signals_.confidence[i] = spawned.confidence[i - range.begin];
     signals_.control_score[i] = spawned.control_score[i - range.begin];
     signals_.density[i] = spawned.density[i - range.begin];
+    signals_.intensity[i] = spawned.intensity[i - range.begin];
     signals_.last_seen[i] = number;
     signals_.trackable[i] = 1;
   }
@@ -93,6 +95,7 @@ std::size_t GaussianMap::RemoveIf(F&& f) {
   Gather(signals_.confidence, old_row);
   Gather(signals_.control_score, old_row);
   Gather(signals_.density, old_row);
+  Gather(signals_.intensity, old_row);
   Gather(signals_.last_seen, old_row);
   Gather(signals_.seen_through, old_row);
   Gather(signals_.trackable, old_row);

@@ -12,6 +12,7 @@ struct GaussianSignals {
   std::vector<float> confidence;        ///< u
   std::vector<float> control_score;     ///< c, NaN where unknown
   std::vector<float> density;           ///< measurements per m2 it was made of, 0: of one
+  std::vector<float> intensity;         ///< mean of its measurements, 0 if scans have none
   std::vector<int> last_seen;           ///< keyframe whose scan last agreed with the Gaussian (k_i)
   std::vector<int> seen_through;        ///< keyframes since then that measured beyond it
   std::vector<std::uint8_t> trackable;  ///< m_i

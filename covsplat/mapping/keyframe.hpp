@@ -17,6 +17,7 @@ namespace covsplat {
 struct SweptScan {
   SE3 T_map_sensor;
   std::vector<Eigen::Vector3f> points;  ///< all points, deskewed, sensor frame at mid scan, m
+  std::vector<float> intensity = {};    ///< of each, or empty
 };
 
 /// A scan with its pose: everything that crosses from tracking to mapping. All vectors are in the
@@ -26,6 +27,7 @@ struct TrackedScan {
   double stamp_s = 0.0;   ///< mid scan
   SE3 T_map_sensor;
   std::vector<Eigen::Vector3f> points;      ///< all usable points, deskewed, m
+  std::vector<float> intensity;             ///< of each, or empty
   std::vector<Eigen::Vector3f> surface;     ///< [S] deskewed source points of the registration, m
   std::vector<PointCovariance> covariance;  ///< [S] the surface around each
   std::vector<float> squared_distance;      ///< [S] m^2 to the target, infinity where unmatched

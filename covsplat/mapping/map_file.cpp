@@ -69,6 +69,7 @@ PointTable TableOf(const SavedMap& map) {
   add("rot_3", ColumnOf(map, kQuatZ));
   add("confidence", map.confidence);
   add("control_score", map.control_score);
+  add("intensity", map.intensity);
   add("keyframe", floats(map.keyframe));
   add("last_seen", floats(map.last_seen));
   return table;
@@ -117,6 +118,7 @@ SavedMap FlattenMap(const GaussianMap& map) {
       const float score = map.Signals().control_score[i];
       saved.confidence.push_back(map.Signals().confidence[i]);
       saved.control_score.push_back(std::isnan(score) ? -1.0f : score);
+      saved.intensity.push_back(map.Signals().intensity[i]);
       saved.keyframe.push_back(range.anchor);
       saved.last_seen.push_back(map.Signals().last_seen[i]);
     }
@@ -148,6 +150,7 @@ Result<SavedMap> ReadMapPly(const std::filesystem::path& path) {
   }
   map.confidence = Values<float>(*table, "confidence", 0.0f);
   map.control_score = Values<float>(*table, "control_score", 0.0f);
+  map.intensity = Values<float>(*table, "intensity", 0.0f);
   map.keyframe = Values<int>(*table, "keyframe", -1);
   map.last_seen = Values<int>(*table, "last_seen", -1);
   return map;

@@ -13,6 +13,7 @@ struct SavedMap {
   GaussianColumns<float> gaussians;
   std::vector<float> confidence;     ///< u
   std::vector<float> control_score;  ///< c, -1 where unknown
+  std::vector<float> intensity;      ///< mean of its measurements, 0 if the recording has none
   std::vector<int> keyframe;         ///< that the Gaussian came with
   std::vector<int> last_seen;        ///< keyframe that last agreed with it
 
@@ -26,7 +27,7 @@ Eigen::Vector3f NormalOf(const GaussianColumns<float>& gaussians, std::size_t ro
 
 /// Writes binary little-endian floats, at once: x y z, normal, colour (from the normal, as f_dc),
 /// opacity (logit), scale_0 to 2 (logarithm; the third is the thickness of the disc), rot_0 to 3
-/// (w x y z), confidence, control_score, keyframe, last_seen.
+/// (w x y z), confidence, control_score, intensity, keyframe, last_seen.
 Result<void> WriteMapPly(const std::filesystem::path& path, const SavedMap& map);
 
 /// Reads what WriteMapPly wrote. Of other files of 3D Gaussians it reads what they have: signals

@@ -124,6 +124,7 @@ Patch PatchOf(const Plane& plane, const Moments& moments, const Eigen::Vector3d&
   patch.axes.rightCols<2>() = (side * plane.axes.rightCols<2>()).cast<float>();
   patch.sigma_m = plane.variance.cwiseSqrt().cast<float>();
   patch.density = static_cast<float>(plane.density);
+  patch.intensity = static_cast<float>(moments.intensity / moments.count);
   return patch;
 }
 

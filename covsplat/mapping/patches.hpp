@@ -61,6 +61,7 @@ struct Patch {
   Eigen::Matrix3f axes;     ///< columns: descending variance; the last faces who measured it
   Eigen::Vector3f sigma_m;  ///< standard deviations of the measurements along the axes
   float density;            ///< measurements per m2
+  float intensity;          ///< mean of the measurements, 0 if scans have none
 };
 
 struct PatchFit {

@@ -22,12 +22,15 @@ constexpr std::array<int, 16> kSpread = [] {
 
 }  // namespace
 
-void Moments::Add(const Eigen::Vector3d& point, const Eigen::Vector3d& sensor) {
+void Moments::Add(const Eigen::Vector3d& point,
+                  const Eigen::Vector3d& sensor,
+                  double its_intensity) {
   count += 1.0;
   sum += point;
   square += point.cwiseAbs2();
   mixed += Eigen::Vector3d(point.x() * point.y(), point.y() * point.z(), point.z() * point.x());
   to_sensor += sensor - point;
+  intensity += its_intensity;
 }
 
 void Moments::Add(const Moments& other) {
@@ -36,6 +39,7 @@ void Moments::Add(const Moments& other) {
   square += other.square;
   mixed += other.mixed;
   to_sensor += other.to_sensor;
+  intensity += other.intensity;
 }
 
 Eigen::Matrix3d Moments::Covariance() const {
@@ -52,6 +56,7 @@ struct PointGrid::Sorted {
   struct Point {
     Eigen::Vector3f p_grid;
     int scan = 0;
+    float intensity = 0.0f;
   };
   std::vector<Eigen::Vector3d> sensor;  ///< [scans] positions in the frame of the grid
   std::vector<Point> points;
@@ -94,9 +99,11 @@ PointGrid::Sorted PointGrid::SortIntoBlocks(std::span<const PosedPoints> scans,
     const Eigen::Matrix3f rotation = T_grid_sensor.RotationMatrix().cast<float>();
     const Eigen::Vector3f translation = T_grid_sensor.Translation().cast<float>();
     sorted.sensor.push_back(T_grid_sensor.Translation());
-    for (const Eigen::Vector3f& p : scans[s].points) {
+    for (std::size_t i = 0; i < scans[s].points.size(); ++i) {
+      const Eigen::Vector3f& p = scans[s].points[i];
       const float square = p.squaredNorm();
-      points.push_back({rotation * p + translation, static_cast<int>(s)});
+      const float intensity = scans[s].intensity.empty() ? 0.0f : scans[s].intensity[i];
+      points.push_back({rotation * p + translation, static_cast<int>(s), intensity});
       int block = -1;
       if (square >= min_square && square <= max_square) {
         const Eigen::Vector3i index = CellOf(blocks_per_m * points.back().p_grid);
@@ -146,7 +153,8 @@ std::vector<PointCell> PointGrid::CellsOf(const Sorted& sorted, std::size_t bloc
     }
     cells[static_cast<std::size_t>(slot)].moments.Add(
         point.p_grid.cast<double>() - corner,
-        sorted.sensor[static_cast<std::size_t>(point.scan)] - corner);
+        sorted.sensor[static_cast<std::size_t>(point.scan)] - corner,
+        static_cast<double>(point.intensity));
   }
   std::sort(cells.begin(), cells.end(), [](const PointCell& a, const PointCell& b) {
     return a.code < b.code;

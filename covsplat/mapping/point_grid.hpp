@@ -17,6 +17,7 @@ namespace covsplat {
 struct PosedPoints {
   SE3 T_map_sensor;
   std::span<const Eigen::Vector3f> points;  ///< m
+  std::span<const float> intensity = {};    ///< of each, or empty
 };
 
 /// Sums over measurements, their positions relative to a corner.
@@ -26,8 +27,9 @@ struct Moments {
   Eigen::Vector3d square = Eigen::Vector3d::Zero();     ///< xx, yy, zz
   Eigen::Vector3d mixed = Eigen::Vector3d::Zero();      ///< xy, yz, zx
   Eigen::Vector3d to_sensor = Eigen::Vector3d::Zero();  ///< from the point to who measured it
+  double intensity = 0.0;
 
-  void Add(const Eigen::Vector3d& point, const Eigen::Vector3d& sensor);
+  void Add(const Eigen::Vector3d& point, const Eigen::Vector3d& sensor, double its_intensity);
   void Add(const Moments& other);
   Eigen::Vector3d Mean() const { return sum / count; }
   Eigen::Matrix3d Covariance() const;

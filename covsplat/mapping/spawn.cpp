@@ -162,6 +162,7 @@ void Append(const Eigen::Vector3f& mean,
             const Eigen::Vector2d& scales,
             float control_score,
             float density,
+            float intensity,
             const SpawnConfig& config,
             SpawnedGaussians& spawned) {
   const std::size_t i = spawned.gaussians.Size();
@@ -175,6 +176,7 @@ void Append(const Eigen::Vector3f& mean,
   spawned.confidence.push_back(static_cast<float>(u));
   spawned.control_score.push_back(control_score);
   spawned.density.push_back(density);
+  spawned.intensity.push_back(intensity);
 }
 
 /// Control score of the surface that the keyframe shows in a pixel, NaN where it shows none.
@@ -197,7 +199,7 @@ void SpawnFromPatches(const Keyframe& keyframe,
             .cwiseMax(config.min_scale_m)
             .cwiseMin(config.max_scale_m);
     const float score = ControlScoreAt(keyframe, pixel);
-    Append(patch.mean, patch.axes, scales, score, patch.density, config, spawned);
+    Append(patch.mean, patch.axes, scales, score, patch.density, patch.intensity, config, spawned);
   }
 }
 
@@ -206,8 +208,10 @@ void SpawnFromPixels(const Keyframe& keyframe,
                      const SensorModel& sensor,
                      const SpawnConfig& config,
                      SpawnedGaussians& spawned) {
+  const std::vector<float>& intensity = keyframe.tracked.intensity;
   for (const Site& site : sites) {
     const auto surface = static_cast<std::size_t>(keyframe.surface(site.row, site.column));
+    const auto point = static_cast<std::size_t>(keyframe.point(site.row, site.column));
     const PointCovariance& covariance = keyframe.tracked.covariance[surface];
     const Eigen::Vector3f mean = OnSurface(keyframe, site, covariance.axes.col(2), config);
     const double range = mean.norm();
@@ -218,6 +222,7 @@ void SpawnFromPixels(const Keyframe& keyframe,
            InitialScales(config, covariance.sigma_m, range, sampling_m),
            keyframe.control_score[surface],
            0.0f,
+           intensity.empty() ? 0.0f : intensity[point],
            config,
            spawned);
   }
@@ -227,8 +232,10 @@ void SpawnFromPixels(const Keyframe& keyframe,
 std::vector<PosedPoints> WithSweep(const TrackedScan& tracked) {
   std::vector<PosedPoints> scans;
   scans.reserve(tracked.sweep.size() + 1);
-  for (const SweptScan& scan : tracked.sweep) scans.push_back({scan.T_map_sensor, scan.points});
-  scans.push_back({tracked.T_map_sensor, tracked.points});
+  for (const SweptScan& scan : tracked.sweep) {
+    scans.push_back({scan.T_map_sensor, scan.points, scan.intensity});
+  }
+  scans.push_back({tracked.T_map_sensor, tracked.points, tracked.intensity});
   return scans;
 }
 

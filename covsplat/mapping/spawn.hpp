@@ -84,6 +84,7 @@ struct SpawnedGaussians {
   std::vector<float> confidence;     ///< [N] u
   std::vector<float> control_score;  ///< [N] c, NaN where unknown
   std::vector<float> density;        ///< [N] measurements per m2, 0 of single pixels
+  std::vector<float> intensity;      ///< [N] mean of the measurements, 0 if scans have none
 };
 
 /// Patches through all scans since the last keyframe where they lie dense enough; nothing if

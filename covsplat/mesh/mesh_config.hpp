@@ -50,8 +50,20 @@ struct ViewConfig {
   }
 };
 
-/// How rendered views become a signed distance field, and that a surface.
+enum class MeshMethod {
+  kFusion,   ///< rendered views and discs in a signed distance field, contoured
+  kPoisson,  ///< screened Poisson reconstruction of points on the discs
+};
+
+template <>
+struct EnumNames<MeshMethod> {
+  static constexpr std::array<EnumName<MeshMethod>, 2> kNames{
+      {{MeshMethod::kFusion, "fusion"}, {MeshMethod::kPoisson, "poisson"}}};
+};
+
+/// How the map becomes a surface.
 struct MeshConfig {
+  MeshMethod method = MeshMethod::kFusion;
   double voxel_m = 0.0;
   double truncation_voxels = 3.0;
   double min_weight = 0.1;
@@ -64,6 +76,11 @@ struct MeshConfig {
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
+    v.Field("method",
+            c.method,
+            "fusion: rendered views in a signed distance field; poisson: screened Poisson "
+            "reconstruction of points on the discs, for which only voxel_m, min_component_m2 and "
+            "threads count");
     v.Field("voxel_m",
             c.voxel_m,
             Range{0.0, 10.0},

@@ -56,12 +56,14 @@ std::size_t DropBroken(SurfelMap& map) {
     map.gaussians.MoveRow(i, kept);
     map.keyframe[kept] = map.keyframe[i];
     map.confidence[kept] = map.confidence[i];
+    map.intensity[kept] = map.intensity[i];
     ++kept;
   }
   const std::size_t dropped = map.Size() - kept;
   map.gaussians.Resize(kept);
   map.keyframe.resize(kept);
   map.confidence.resize(kept);
+  map.intensity.resize(kept);
   return dropped;
 }
 

@@ -13,6 +13,7 @@ struct SurfelMap {
   GaussianColumns<float> gaussians;
   std::vector<int> keyframe;        ///< [N] index of T_map_keyframe
   std::vector<float> confidence;    ///< [N] u, in [0, 1]
+  std::vector<float> intensity;     ///< [N] 0 if the recording has none
   std::vector<SE3> T_map_keyframe;  ///< [K]
 
   std::size_t Size() const { return gaussians.Size(); }

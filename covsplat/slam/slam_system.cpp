@@ -192,7 +192,8 @@ bool SlamSystem::MaybeHoldOut(const TrackResult& result) {
 
 void SlamSystem::AddToSweep(TrackResult& result) {
   if (!config_.mapper.spawn.patches.enabled || result.state != TrackState::kTracking) return;
-  sweep_.push_back({result.tracked.T_map_sensor, std::move(result.tracked.points)});
+  TrackedScan& tracked = result.tracked;
+  sweep_.push_back({tracked.T_map_sensor, std::move(tracked.points), std::move(tracked.intensity)});
 }
 
 void SlamSystem::Finish() {

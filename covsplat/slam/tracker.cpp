@@ -239,6 +239,7 @@ TrackedScan Tracker::Deskewed(const Scan& scan,
   tracked.stamp_s = prepared.timing.mid_stamp_s;
   tracked.T_map_sensor = motion.T_map_sensor;
   tracked.points = Deskew(scan.points, prepared.timing.phase, motion);
+  tracked.intensity = scan.intensity;
   tracked.surface = Deskew(prepared.source.points, prepared.source.phase, motion);
   tracked.covariance = prepared.source.covariance;
   if (prepared.timing.phase.empty()) {

@@ -149,6 +149,7 @@ def broken_runs_are_input_errors_that_name_the_file(bench):
         expect(bench.call(verb, bench.folder / "nothing"), 3, err="config.yaml")
     expect(bench.call("mesh", whole, "-o", "mesh.stl"), 2, err=".glb")
     expect(bench.call("mesh", whole, "-s", "voxel=1"), 2, err="voxel_m")
+    expect(bench.call("mesh", whole, "--method", "cubes"), 2, err="poisson")
     expect(bench.call("export", whole, "-o", "cloud.las"), 2, err=".pcd")
     expect(bench.call("render", whole, "--sensor", "os9", "-o", "x"), 2, err="os0-128")
     expect(bench.call("render", whole, "--poses", "no.txt", "-o", "x"), 3, err="no.txt")

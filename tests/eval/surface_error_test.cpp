@@ -5,8 +5,8 @@
 #include "tests/eval/meshes.hpp"
 #include <gtest/gtest.h>
 
+#include "covsplat/core/nearest_points.hpp"
 #include "covsplat/core/rng.hpp"
-#include "covsplat/eval/nearest_points.hpp"
 #include "covsplat/eval/surface_samples.hpp"
 
 namespace covsplat {

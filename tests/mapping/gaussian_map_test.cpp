@@ -34,6 +34,7 @@ SpawnedGaussians Tagged(int first, int count) {
     spawned.confidence.push_back(1e-3f * static_cast<float>(tag));
     spawned.control_score.push_back(static_cast<float>(-tag));
     spawned.density.push_back(2.0f * static_cast<float>(tag));
+    spawned.intensity.push_back(3.0f * static_cast<float>(tag));
   }
   return spawned;
 }
@@ -48,6 +49,7 @@ SpawnedGaussians GaussiansAt(const std::vector<Eigen::Vector3d>& places) {
   spawned.confidence.assign(places.size(), 1.0f);
   spawned.control_score.assign(places.size(), 0.0f);
   spawned.density.assign(places.size(), 0.0f);
+  spawned.intensity.assign(places.size(), 0.0f);
   return spawned;
 }
 
@@ -75,6 +77,7 @@ class GaussianMapTest : public ::testing::Test {
         EXPECT_EQ(map_.Signals().confidence[i], 1e-3f * tag);
         EXPECT_EQ(map_.Signals().control_score[i], -tag);
         EXPECT_EQ(map_.Signals().density[i], 2.0f * tag);
+        EXPECT_EQ(map_.Signals().intensity[i], 3.0f * tag);
         EXPECT_EQ(map_.Signals().last_seen[i], range.anchor);
         EXPECT_EQ(map_.Signals().trackable[i], 1);
         for (int p = 0; p < kParameterCount; ++p) {

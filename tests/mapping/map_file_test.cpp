@@ -30,7 +30,7 @@ constexpr const char* kHeader =
     "property float opacity\n"
     "property float scale_0\nproperty float scale_1\nproperty float scale_2\n"
     "property float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3\n"
-    "property float confidence\nproperty float control_score\n"
+    "property float confidence\nproperty float control_score\nproperty float intensity\n"
     "property float keyframe\nproperty float last_seen\n"
     "end_header\n";
 
@@ -52,6 +52,7 @@ SpawnedGaussians GaussianAt(float x, float score) {
   spawned.confidence = {0.7f};
   spawned.control_score = {score};
   spawned.density = {0.0f};
+  spawned.intensity = {30.0f + x};
   return spawned;
 }
 
@@ -101,7 +102,7 @@ TEST_F(MapFileTest, HeaderIsWhatViewersKnow) {
   std::ostringstream bytes;
   bytes << std::ifstream(folder_ / "map.ply", std::ios::binary).rdbuf();
   EXPECT_EQ(bytes.str().substr(0, std::string(kHeader).size()), kHeader);
-  EXPECT_EQ(bytes.str().size(), std::string(kHeader).size() + 3 * 21 * sizeof(float));
+  EXPECT_EQ(bytes.str().size(), std::string(kHeader).size() + 3 * 22 * sizeof(float));
 }
 
 TEST_F(MapFileTest, NormalColourAndThicknessFollowTheGaussian) {
@@ -130,6 +131,8 @@ TEST_F(MapFileTest, ReadsBackWhatWasWritten) {
   }
   EXPECT_EQ(read->confidence, saved.confidence);
   EXPECT_EQ(read->control_score, saved.control_score);
+  EXPECT_EQ(read->intensity, saved.intensity);
+  EXPECT_GT(read->intensity.front(), 30.0f);
   EXPECT_EQ(read->keyframe, saved.keyframe);
   EXPECT_EQ(read->last_seen, saved.last_seen);
 }

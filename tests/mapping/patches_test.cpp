@@ -35,7 +35,9 @@ SweptScan Wall(int count, std::uint64_t seed) {
 
 std::vector<PosedPoints> Views(const std::vector<SweptScan>& scans) {
   std::vector<PosedPoints> views;
-  for (const SweptScan& scan : scans) views.push_back({scan.T_map_sensor, scan.points});
+  for (const SweptScan& scan : scans) {
+    views.push_back({scan.T_map_sensor, scan.points, scan.intensity});
+  }
   return views;
 }
 
@@ -83,6 +85,18 @@ TEST_F(PatchesTest, KnowTheDensityOfTheirMeasurements) {
     if (patch.sigma_m[1] < 0.2f) continue;  // cut by the wall's edge
     EXPECT_NEAR(patch.density, 20000.0 / 16.0, 200.0);
   }
+}
+
+TEST_F(PatchesTest, CarryTheMeanIntensityOfTheirMeasurements) {
+  SweptScan scan = Wall(20000, 1);
+  for (const Eigen::Vector3f& p : scan.points) {
+    scan.intensity.push_back(p.y() > 0.8f ? 50.0f : 10.0f + (scan.intensity.size() % 2 == 0));
+  }
+  for (const Patch& patch : Fit({scan}).patches) {
+    const bool is_bright = patch.mean.y() > 0.8f;  // the edge of a cell
+    EXPECT_NEAR(patch.intensity, is_bright ? 50.0f : 10.5f, 0.25f);
+  }
+  for (const Patch& patch : Fit({Wall(20000, 1)}).patches) EXPECT_EQ(patch.intensity, 0.0f);
 }
 
 TEST_F(PatchesTest, AreFinerWhereTheSurfaceBends) {

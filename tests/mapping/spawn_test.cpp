@@ -296,6 +296,13 @@ TEST_F(SpawnGaussiansTest, CarryTheControlScoreOfTheirSurface) {
   EXPECT_EQ(Spawn(keyframe).control_score[0], 0.25f);
 }
 
+TEST_F(SpawnGaussiansTest, CarryTheIntensityOfTheirPixel) {
+  Keyframe keyframe = OnePoint(AlongTheBeam(5.0), {0.3f, 0.3f, 0.01f}, 0.0f, pool_);
+  EXPECT_EQ(Spawn(keyframe).intensity, std::vector<float>{0.0f});  // the scan has none
+  keyframe.tracked.intensity = {42.0f};
+  EXPECT_EQ(Spawn(keyframe).intensity, std::vector<float>{42.0f});
+}
+
 TEST_F(SpawnGaussiansTest, NeedAKnownSurface) {
   Keyframe keyframe = OnePoint(AlongTheBeam(5.0), {0.3f, 0.3f, 0.01f}, 0.0f, pool_);
   for (int& surface : keyframe.surface.Pixels()) surface = -1;

@@ -31,6 +31,7 @@ SpawnedGaussians Spawned(const std::vector<Surfel>& surfels) {
     spawned.confidence.push_back(s.confidence);
     spawned.control_score.push_back(0.0f);
     spawned.density.push_back(0.0f);
+    spawned.intensity.push_back(0.0f);
   }
   return spawned;
 }

@@ -1,4 +1,4 @@
-// Maps whose surface is known: Gaussians that tile walls, seen from where a sensor would have been.
+// Maps whose surface is known, seen from where a sensor would have been.
 #include "covsplat/mesh/map_mesher.hpp"
 
 #include <algorithm>
@@ -6,63 +6,15 @@
 #include <limits>
 
 #include "tests/mesh/mesh_checks.hpp"
+#include "tests/mesh/room_map.hpp"
 #include <gtest/gtest.h>
 
 namespace covsplat::test {
 namespace {
 
-using Vector = Eigen::Vector3d;
-
 constexpr double kVoxel = 0.1;
-constexpr double kSpacing = 0.1;
 
 SensorModel Sensor() { return UniformSensorModel(64, 512, -0.7, 0.7, 0.3, 40.0); }
-
-SE3 At(double x, double y, double z) { return {Eigen::Quaterniond::Identity(), Vector(x, y, z)}; }
-
-struct Disc {
-  Vector mean;
-  Vector normal;
-};
-
-/// Fills the rectangle of `centre` +- `u` +- `v` with discs that face the side of u x v.
-void Tile(const Vector& centre, const Vector& u, const Vector& v, std::vector<Disc>& discs) {
-  const int columns = static_cast<int>(std::round(2.0 * u.norm() / kSpacing));
-  const int rows = static_cast<int>(std::round(2.0 * v.norm() / kSpacing));
-  for (int i = 0; i < columns; ++i) {
-    for (int j = 0; j < rows; ++j) {
-      discs.push_back(
-          {centre + u * ((2.0 * i + 1.0) / columns - 1.0) + v * ((2.0 * j + 1.0) / rows - 1.0),
-           u.cross(v).normalized()});
-    }
-  }
-}
-
-SurfelMap MapOf(const std::vector<Disc>& discs, std::vector<SE3> keyframes) {
-  SurfelMap map;
-  map.T_map_keyframe = std::move(keyframes);
-  map.gaussians.Resize(discs.size());
-  map.keyframe.assign(discs.size(), 0);
-  map.confidence.assign(discs.size(), 1.0f);
-  for (std::size_t i = 0; i < discs.size(); ++i) {
-    const auto q = Eigen::Quaterniond::FromTwoVectors(Vector::UnitZ(), discs[i].normal);
-    const double scale = std::log(0.6 * kSpacing);
-    const std::array<double, kParameterCount> row = {discs[i].mean.x(),
-                                                     discs[i].mean.y(),
-                                                     discs[i].mean.z(),
-                                                     q.w(),
-                                                     q.x(),
-                                                     q.y(),
-                                                     q.z(),
-                                                     scale,
-                                                     scale,
-                                                     3.0};
-    for (int p = 0; p < kParameterCount; ++p) {
-      map.gaussians.Column(p)[i] = static_cast<float>(row[static_cast<std::size_t>(p)]);
-    }
-  }
-  return map;
-}
 
 MeshConfig Config() {
   MeshConfig config;
@@ -76,28 +28,6 @@ Result<MeshResult> Mesh(const SurfelMap& map,
                         const MeshConfig& config,
                         const SensorModel& sensor = Sensor()) {
   return MeshOfMap(map, map.T_map_keyframe, sensor, Backend::kCpu, RasterConfig(), config, nullptr);
-}
-
-/// The inside of a box of 4 x 3 x 2 m.
-std::vector<Disc> Room() {
-  std::vector<Disc> discs;
-  const Vector x(2.0, 0.0, 0.0), y(0.0, 1.5, 0.0), z(0.0, 0.0, 1.0);
-  Tile(-x, y, z, discs);
-  Tile(x, z, y, discs);
-  Tile(-y, z, x, discs);
-  Tile(y, x, z, discs);
-  Tile(-z, x, y, discs);
-  Tile(z, y, x, discs);
-  return discs;
-}
-
-double DistanceToRoom(const Vector& p) {
-  const Vector q = p.cwiseAbs() - Vector(2.0, 1.5, 1.0);
-  return q.maxCoeff() <= 0.0 ? -q.maxCoeff() : q.cwiseMax(0.0).norm();
-}
-
-SurfelMap RoomMap() {
-  return MapOf(Room(), {At(0.0, 0.0, 0.0), At(1.0, 0.4, 0.2), At(-1.0, -0.5, -0.2)});
 }
 
 TEST(MapMesher, ARoomIsAccurateToAFifthOfAVoxelAndItsEdgesStaySharp) {

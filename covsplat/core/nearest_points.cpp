@@ -1,4 +1,4 @@
-#include "covsplat/eval/nearest_points.hpp"
+#include "covsplat/core/nearest_points.hpp"
 
 #include <cmath>
 #include <cstdint>
