@@ -13,7 +13,7 @@ find_package(assimp 5.2 REQUIRED)
 find_package(nanoflann 1.4 REQUIRED)
 
 # Only `mesh --method poisson` needs it.
-find_package(Open3D 0.16 QUIET)
+find_package(Open3D QUIET)
 
 find_package(hwy REQUIRED)
 find_package(liblzf REQUIRED)
