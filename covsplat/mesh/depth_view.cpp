@@ -44,18 +44,6 @@ bool IsJump(const DepthPixel& here,
   return std::abs(off) > tolerance_m;
 }
 
-RowRange RowsSeenBy(const SensorModel& sensor, const ViewCamera& camera) {
-  const auto [lowest, highest] =
-      std::minmax_element(sensor.Elevations().begin(), sensor.Elevations().end());
-  RowRange rows;
-  for (int row = 0; row < camera.Rows(); ++row) {
-    const double elevation = std::asin(static_cast<double>(camera.RayOf(row, 0).z()));
-    if (elevation > *highest) rows.begin = row + 1;
-    if (elevation >= *lowest) rows.end = row + 1;
-  }
-  return rows;
-}
-
 float WeightAt(float range_m, const ViewConfig& config) {
   const float ratio = range_m / static_cast<float>(config.half_weight_range_m);
   return 1.0f / (1.0f + ratio * ratio);
@@ -103,12 +91,11 @@ Eigen::Vector3f ViewCamera::RayOf(int row, int column) const {
 DepthView MakeDepthView(const ViewCamera& camera,
                         const RenderOutput& render,
                         const SE3& T_map_view,
-                        const SensorModel& sensor,
                         const ViewConfig& config,
                         ThreadPool& pool) {
   const int rows = camera.Rows();
   const int columns = camera.Columns();
-  DepthView view{T_map_view, Image<DepthPixel>(rows, columns), RowsSeenBy(sensor, camera)};
+  DepthView view{T_map_view, Image<DepthPixel>(rows, columns)};
   const auto min_alpha = static_cast<float>(config.min_alpha);
   const auto disagreement = static_cast<float>(config.max_disagreement);
   ParallelFor(pool, static_cast<std::size_t>(rows), 8, [&](std::size_t begin, std::size_t end) {

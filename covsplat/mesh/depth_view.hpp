@@ -36,12 +36,6 @@ class ViewCamera {
   float columns_per_rad_;
 };
 
-struct RowRange {
-  int begin = 0;
-  int end = 0;
-  bool Holds(int row) const { return row >= begin && row < end; }
-};
-
 /// A plane through the surface that a pixel shows, and how far the pixel can be trusted.
 struct DepthPixel {
   float range_m = 0.0f;                              ///< along the pixel's ray; 0: not known
@@ -52,17 +46,13 @@ struct DepthPixel {
 struct DepthView {
   SE3 T_map_view;
   Image<DepthPixel> pixels;
-  /// Rows of the field of view of the sensor that made the map. Only there is it known that nothing
-  /// lies before a surface: elsewhere a ceiling may be that no scan has seen.
-  RowRange clear;
 };
 
 /// Keeps of a rendering what is opaque enough. Where expected and median range disagree, and next
-/// to jumps in range, the median is taken with little weight. `sensor`: made the map.
+/// to jumps in range, the median is taken with little weight.
 DepthView MakeDepthView(const ViewCamera& camera,
                         const RenderOutput& render,
                         const SE3& T_map_view,
-                        const SensorModel& sensor,
                         const ViewConfig& config,
                         ThreadPool& pool);
 

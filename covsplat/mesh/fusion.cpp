@@ -35,15 +35,10 @@ void FuseVoxel(const FusionJob& job, const Eigen::Vector3f& p_view, Voxel& voxel
   const float in_front = pixel.range_m - range;
   // Beyond this the plane says nothing of the place, however flat it is seen.
   const float reach = 2.0f * job.truncation_m;
-  if (in_front < -reach) return;
-  float distance = job.truncation_m;
-  if (in_front >= reach) {
-    if (!job.view->clear.Holds(index / job.camera->Columns())) return;
-  } else {
-    distance = pixel.normal.dot(p_view - pixel.range_m * job.rays->Pixels()[i]);
-    if (distance <= -job.behind_m) return;
-    distance = std::min(distance, job.truncation_m);
-  }
+  if (std::abs(in_front) > reach) return;
+  float distance = pixel.normal.dot(p_view - pixel.range_m * job.rays->Pixels()[i]);
+  if (distance <= -job.behind_m) return;
+  distance = std::min(distance, job.truncation_m);
   const float weight = pixel.weight * WeightBehind(distance, job);
   voxel.weight += weight;
   voxel.distance += weight * distance / job.voxel_m;

@@ -11,8 +11,8 @@ inline constexpr double kBehindShare = 2.0 / 3.0;
 
 /// Adds a view to every block it sees: each voxel gathers the plane of the pixel that it falls on,
 /// so blocks are independent and the sums come out the same for any number of threads and any
-/// choice of blocks. Voxels in front of a surface are free, those behind it by more than the
-/// truncation are hidden.
+/// choice of blocks. Nothing is said of voxels farther from a surface than the truncation: what has
+/// moved on since it was measured is the mapper's to remove, who knows what scans saw.
 void FuseView(const ViewCamera& camera,
               const DepthView& view,
               const MeshConfig& config,

@@ -70,7 +70,8 @@ Result<MeshResult> MeshOfMap(const SurfelMap& map,
   MeshResult result;
   result.voxel_m = config.voxel_m > 0.0 ? config.voxel_m : VoxelFor(map);
   result.views = T_map_view.size();
-  const double margin_m = (config.truncation_voxels + 1.0) * result.voxel_m;
+  const double margin_m =
+      std::max(config.truncation_voxels + 1.0, config.bridge_voxels) * result.voxel_m;
   const auto blocks = BlocksNear(map, result.voxel_m, margin_m, pool);
   if (!blocks) return Forward(blocks);
   const std::vector<Tile> tiles = SplitIntoTiles(*blocks, config.max_tile_blocks);
@@ -89,7 +90,7 @@ Result<MeshResult> MeshOfMap(const SurfelMap& map,
     VoxelGrid grid(result.voxel_m, tiles[t].padded);
     for (const SE3& pose : views[t]) {
       const RenderOutput render = (*engine)->Render(pose);
-      const DepthView view = MakeDepthView(camera, render, pose, sensor, config.view, pool);
+      const DepthView view = MakeDepthView(camera, render, pose, config.view, pool);
       FuseView(camera, view, config, grid, pool);
       ++progress.done;
       if (on_progress && !on_progress(progress)) {

@@ -65,11 +65,13 @@ struct EnumNames<MeshMethod> {
 struct MeshConfig {
   MeshMethod method = MeshMethod::kFusion;
   double voxel_m = 0.0;
-  double truncation_voxels = 3.0;
+  double truncation_voxels = 2.0;
   double min_weight = 0.1;
   double surfel_weight = 3.0;
+  double surfel_sigmas = 1.0;
+  double bridge_voxels = 5.0;
   double sharpness = 0.9;
-  double min_component_m2 = 0.02;
+  double min_component_m2 = 0.005;
   int max_tile_blocks = 40000;
   int threads = 0;
   ViewConfig view;
@@ -99,6 +101,14 @@ struct MeshConfig {
         c.surfel_weight,
         Range{0.0, 1e3},
         "what the Gaussians' own discs count in their middle, beside the views; 0: views alone");
+    v.Field("surfel_sigmas",
+            c.surfel_sigmas,
+            Range{0.1, 5.0},
+            "discs end after so many standard deviations: beyond, few measurements bear them out");
+    v.Field("bridge_voxels",
+            c.bridge_voxels,
+            Range{0.0, 50.0},
+            "gaps between discs are closed that come no farther than this from each of them");
     v.Field("sharpness",
             c.sharpness,
             Range{0.0, 1.0},

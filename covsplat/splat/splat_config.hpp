@@ -60,6 +60,8 @@ struct LossConfig {
   double scale = 10.0;
   double max_scale_m = 0.5;
   double min_alpha = 0.1;
+  double hidden_margin_m = 0.3;
+  double hidden_margin_ratio = 0.03;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
@@ -87,6 +89,15 @@ struct LossConfig {
             c.min_alpha,
             Range{1e-4, 1.0},
             "range and normal terms need at least this rendered opacity");
+    v.Field("hidden_margin_m",
+            c.hidden_margin_m,
+            Range{0.0, 1e6},
+            "Gaussians farther than this behind a measurement ...");
+    v.Field("hidden_margin_ratio",
+            c.hidden_margin_ratio,
+            Range{0.0, 1.0},
+            "... plus this share of the range are not changed by it: its ray has not been there, "
+            "and what shines through an incomplete surface shall not fade for that");
   }
 };
 

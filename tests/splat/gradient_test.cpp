@@ -285,6 +285,7 @@ TEST(RasterizerGradient, WholeLoss) {
   LossConfig loss;
   loss.gicp_normal = 0.5;
   loss.surface_normal = 0.3;
+  loss.hidden_margin_m = 1e6;  // the full derivative
   const LossSums sums = scene.rasterizer.StepLoss(targets, loss, nullptr);
   EXPECT_NEAR(
       sums.Total(), LossOf(scene.rasterizer.Images(), targets, loss, config.depth_ratio), 1e-9);
@@ -302,6 +303,48 @@ TEST(RasterizerGradient, WholeLoss) {
     EXPECT_LT(c.worst_error, 1e-3) << "tangent " << tangent;
     EXPECT_LT(c.skipped_share, 0.35) << "tangent " << tangent;
   }
+}
+
+TEST(RasterizerGradient, AMeasurementChangesNothingBehindIt) {
+  Scene scene(SmoothConfig(), 0.0, SE3());
+  TileTargets<double> targets = MakeTargets(scene);
+  constexpr double kMeasured = 5.0;
+  for (double& range : targets.range_m) range = range > 0.0 ? kMeasured : 0.0;
+  const auto gradient = [&](double margin_m) {
+    LossConfig loss;
+    loss.hidden_margin_m = margin_m;
+    scene.Look(scene.table);
+    scene.rasterizer.StepLoss(targets, loss, nullptr);
+    GradientColumns<double> gradients;
+    gradients.Resize(scene.table.Size());
+    scene.rasterizer.Collect(scene.table, gradients);
+    return gradients;
+  };
+  const LossConfig defaults;
+  const GradientColumns<double> all = gradient(1e6);
+  const GradientColumns<double> reached = gradient(defaults.hidden_margin_m);
+  const double limit = kMeasured * (1.0 + defaults.hidden_margin_ratio) + defaults.hidden_margin_m;
+  int before = 0;
+  int behind = 0;
+  for (std::size_t i = 0; i < scene.table.Size(); ++i) {
+    const Eigen::Vector3d mean(scene.table.Column(kMeanX)[i],
+                               scene.table.Column(kMeanY)[i],
+                               scene.table.Column(kMeanZ)[i]);
+    const double extent = 4.0 * std::exp(std::max(scene.table.Column(kLogScaleU)[i],
+                                                  scene.table.Column(kLogScaleV)[i]));
+    for (int tangent = 0; tangent < kTangentCount; ++tangent) {
+      if (mean.norm() + extent < limit) {
+        const double whole = all.Column(tangent)[i];  // a little of it at four deviations
+        EXPECT_NEAR(reached.Column(tangent)[i], whole, 1e-4 * std::abs(whole)) << i;
+        before += all.Column(tangent)[i] != 0.0;
+      } else if (mean.norm() - extent > limit) {
+        EXPECT_EQ(reached.Column(tangent)[i], 0.0) << i << " " << tangent;
+        behind += all.Column(tangent)[i] != 0.0;
+      }
+    }
+  }
+  EXPECT_GT(before, 20);
+  EXPECT_GT(behind, 20);
 }
 
 TEST(RasterizerGradient, FloatFollowsDouble) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "covsplat/splat/cpu/rasterize.cpp"
@@ -226,12 +227,13 @@ template <class S>
 struct ImageGradient {
   Pack<S> alpha, range_sum, median;
   Pack3<S> normal;
+  Pack<S> hidden_from;  ///< Gaussians from this range on have no gradient
 };
 
 template <class S>
 HWY_INLINE ImageGradient<S> NoGradient() {
   const Pack<S> zero = All(S(0));
-  return {zero, zero, zero, {zero, zero, zero}};
+  return {zero, zero, zero, {zero, zero, zero}, All(std::numeric_limits<S>::max())};
 }
 
 /// 1 - <N / A, target> where the target normal is known; adds to the gradient, returns the loss.
@@ -268,6 +270,10 @@ PixelLoss(const TileJob<S>& job, std::size_t tile, const Blend<S>& blend, ImageG
   const Pack<S> alpha = one - blend.transmittance;
   const Pack<S> opaque = alpha + All(static_cast<S>(loss.opacity_epsilon));
   g.alpha = SelectOrZero(valid, All(-per_opacity) / opaque);
+  const Pack<S> hidden_from = MulAdd(measured,
+                                     All(static_cast<S>(1.0 + loss.hidden_margin_ratio)),
+                                     All(static_cast<S>(loss.hidden_margin_m)));
+  g.hidden_from = Select(valid, hidden_from, g.hidden_from);
 
   const auto covered = valid & (alpha > All(static_cast<S>(loss.min_alpha)));
   const Pack<S> inverse_alpha = one / Max(alpha, All(static_cast<S>(loss.min_alpha)));
@@ -387,16 +393,18 @@ HWY_INLINE void BackTile(const TileJob<S>& job,
     const Pack<S> range = Abs(kept_range);
     const Pack<S> value = MulAdd(g.range_sum, range, g.alpha) + Dot(g.normal, Broadcast(s.n));
     const Pack<S> gained = weight * value;
-    const auto below_cap = seen & (alpha < All(job.view->alpha_cap));
+    const auto reached = seen & (range < g.hidden_from);
+    const auto below_cap = reached & (alpha < All(job.view->alpha_cap));
     const Pack<S> g_alpha = SelectOrZero(below_cap, NegMulAdd(suffix * inverse, alpha, gained));
     suffix = suffix + gained;
     const auto is_median = seen & Equal(blend.median_entry, All(static_cast<S>(i)));
-    const Pack<S> g_range = MulAdd(weight, g.range_sum, SelectOrZero(is_median, g.median));
+    const Pack<S> g_range =
+        SelectOrZero(reached, MulAdd(weight, g.range_sum, SelectOrZero(is_median, g.median)));
     SurfelGradient(*job.view,
                    rays,
                    s,
                    kept_range,
-                   weight,
+                   SelectOrZero(reached, weight),
                    g_alpha,
                    g_range,
                    g,
