@@ -65,9 +65,11 @@ tools/node_modules: tools/package-lock.json
 	npm --prefix tools ci --no-audit --no-fund
 	@touch $@
 
-check-map: tools/node_modules  ## Check that MAP=map.ply opens in Spark (needs node 20)
+check-map: build-release tools/node_modules  ## Check that MAP=map.ply, and SPZ of it, open in Spark (needs node 20)
 	@test -n "$(MAP)" || { echo "say which: make check-map MAP=folder/map.ply"; exit 2; }
-	node tools/check_map_ply.mjs "$(MAP)"
+	@folder=$$(mktemp -d) && trap 'rm -r "$$folder"' EXIT && \
+	  build/release/apps/covsplat export "$(MAP)" -o "$$folder/map.spz" --quiet && \
+	  node tools/check_map.mjs "$(MAP)" "$$folder/map.spz"
 
 format:  ## Format the sources
 	@tools/setup.sh --with-dev

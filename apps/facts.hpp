@@ -12,7 +12,7 @@ namespace covsplat {
 /// What was detected in a folder of scans, and what to mind when running on it ("hints").
 Result<nlohmann::ordered_json> RecordingFacts(const std::filesystem::path& folder);
 
-/// Counts, size and statistics of a map.ply.
+/// Format, counts, size, statistics, signals and, if the file says, the sensor of a map file.
 Result<nlohmann::ordered_json> MapFacts(const std::filesystem::path& file);
 
 /// The metrics of a run folder.

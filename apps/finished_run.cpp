@@ -1,10 +1,12 @@
 #include "apps/finished_run.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "apps/sensor_choice.hpp"
 
 #include "covsplat/config/config.hpp"
+#include "covsplat/io/text.hpp"
 #include "covsplat/io/trajectory_file.hpp"
 
 namespace covsplat {
@@ -12,14 +14,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
+bool IsFile(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
 Result<void> CheckFolder(const fs::path& folder) {
   std::error_code ignored;
   if (!fs::is_directory(folder, ignored)) {
     return Fail(ErrorCode::kInput,
-                "{}: is no folder; name one that `covsplat run` or `covsplat demo` wrote",
+                "{}: does not exist; name a folder that `covsplat run` or `covsplat demo` wrote, "
+                "or a map file",
                 folder.string());
   }
-  for (const char* name : {"config.yaml", "trajectory_tum.txt", "keyframes_tum.txt", "map.ply"}) {
+  for (const char* name : {"config.yaml", "trajectory_tum.txt", "keyframes_tum.txt"}) {
     if (fs::exists(folder / name, ignored)) continue;
     return Fail(ErrorCode::kInput,
                 "{}: has no {}; name a folder that `covsplat run` wrote and finished",
@@ -29,52 +37,122 @@ Result<void> CheckFolder(const fs::path& folder) {
   return {};
 }
 
-Result<void> CheckKeyframes(const SurfelMap& map, const fs::path& folder) {
-  const int count = static_cast<int>(map.T_map_keyframe.size());
+/// The one file of Gaussians in a run's folder.
+Result<fs::path> MapFileIn(const fs::path& folder) {
+  for (const char* name : {"map.ply", "map.csmap"}) {
+    if (IsFile(folder / name)) return folder / name;
+  }
+  return Fail(ErrorCode::kInput,
+              "{}: has no map.ply or map.csmap; name a folder that `covsplat run` wrote and "
+              "finished",
+              folder.string());
+}
+
+Result<void> CheckKeyframes(const SavedMap& map, const fs::path& file, std::string_view source) {
+  const int count = static_cast<int>(map.keyframes.size());
   for (const int keyframe : map.keyframe) {
     if (keyframe >= 0 && keyframe < count) continue;
-    return Fail(
-        ErrorCode::kInput,
-        "{}: a Gaussian belongs to keyframe {} but keyframes_tum.txt has {}; these files are "
-        "not of one run",
-        (folder / "map.ply").string(),
-        keyframe,
-        count);
+    return Fail(ErrorCode::kInput,
+                "{}: a Gaussian belongs to keyframe {} but {} has {}; these are not of one run",
+                file.string(),
+                keyframe,
+                source,
+                count);
   }
+  return {};
+}
+
+Result<MapFile> ReadMapIn(const fs::path& folder) {
+  if (const Result<void> complete = CheckFolder(folder); !complete) return Forward(complete);
+  const Result<fs::path> file = MapFileIn(folder);
+  if (!file) return Forward(file);
+  Result<Trajectory> keyframes = ReadTum(folder / "keyframes_tum.txt");
+  if (!keyframes) return Forward(keyframes);
+  Result<std::string> config = ReadFile(folder / "config.yaml");
+  if (!config) return Forward(config);
+  Result<MapFile> read = ReadMapFile(*file);
+  if (!read) return read;
+  read->map.keyframes = std::move(*keyframes);
+  read->map.config_yaml = std::move(*config);
+  const auto fits = CheckKeyframes(read->map, *file, "keyframes_tum.txt");
+  if (!fits) return Forward(fits);
+  return read;
+}
+
+/// Gaussians ride on keyframes, so a map that knows none gets one.
+void EnsureKeyframes(SavedMap& map) {
+  if (!map.keyframes.empty()) return;
+  map.keyframes = {TimedPose()};
+  std::fill(map.keyframe.begin(), map.keyframe.end(), 0);
+}
+
+SurfelMap SurfelsOf(SavedMap map) {
+  SurfelMap surfels;
+  surfels.gaussians = std::move(map.gaussians);
+  surfels.keyframe = std::move(map.keyframe);
+  surfels.confidence = std::move(map.confidence);
+  surfels.intensity = std::move(map.intensity);
+  for (const TimedPose& pose : map.keyframes) {
+    surfels.T_map_keyframe.push_back(pose.T_world_sensor);
+  }
+  return surfels;
+}
+
+/// What the configuration says, if there is one; `name` stands for it in errors.
+Result<void> ApplyConfig(const std::string& yaml, const std::string& name, FinishedRun& run) {
+  if (yaml.empty()) return {};
+  if (auto loaded = LoadYamlText(yaml, name, run.config); !loaded) return loaded;
+  const Result<SensorModel> sensor = SensorOf(run.config.slam);
+  if (!sensor) return Fail(ErrorCode::kInput, "{}: {}", name, sensor.error().message);
+  run.sensor = *sensor;
   return {};
 }
 
 }  // namespace
 
-Result<FinishedRun> ReadRun(const fs::path& folder) {
-  if (const Result<void> complete = CheckFolder(folder); !complete) return Forward(complete);
-  AppConfig config;
-  const Result<void> loaded = LoadYaml((folder / "config.yaml").string(), config);
-  if (!loaded) return Forward(loaded);
-  Result<SensorModel> sensor = SensorOf(config.slam);
-  if (!sensor) {
-    return Fail(
-        ErrorCode::kInput, "{}: {}", (folder / "config.yaml").string(), sensor.error().message);
+Result<MapFile> ReadRunMap(const fs::path& run_or_map) {
+  if (!IsFile(run_or_map)) return ReadMapIn(run_or_map);
+  Result<MapFile> read = ReadMapFile(run_or_map);
+  if (!read || read->map.keyframes.empty()) return read;
+  const auto fits = CheckKeyframes(read->map, run_or_map, "its list of keyframes");
+  if (!fits) return Forward(fits);
+  return read;
+}
+
+Result<FinishedRun> ReadRun(const fs::path& run_or_map) {
+  Result<MapFile> read = ReadRunMap(run_or_map);
+  if (!read) return Forward(read);
+  FinishedRun run;
+  const bool is_file = IsFile(run_or_map);
+  const std::string config_name = is_file ? run_or_map.string() + " (its configuration)"
+                                          : (run_or_map / "config.yaml").string();
+  const auto configured = ApplyConfig(read->map.config_yaml, config_name, run);
+  if (!configured) return Forward(configured);
+  run.trajectory = read->map.keyframes;
+  if (!is_file) {
+    Result<Trajectory> trajectory = ReadTum(run_or_map / "trajectory_tum.txt");
+    if (!trajectory) return Forward(trajectory);
+    run.trajectory = std::move(*trajectory);
   }
-  FinishedRun run{std::move(config), std::move(*sensor), {}, {}, 0};
-  Result<Trajectory> trajectory = ReadTum(folder / "trajectory_tum.txt");
-  if (!trajectory) return Forward(trajectory);
-  run.trajectory = std::move(*trajectory);
-  const Result<Trajectory> keyframes = ReadTum(folder / "keyframes_tum.txt");
-  if (!keyframes) return Forward(keyframes);
-  for (const TimedPose& pose : *keyframes) run.map.T_map_keyframe.push_back(pose.T_world_sensor);
-  Result<SavedMap> saved = ReadMapPly(folder / "map.ply");
-  if (!saved) return Forward(saved);
-  run.map.gaussians = std::move(saved->gaussians);
-  run.map.keyframe = std::move(saved->keyframe);
-  if (const auto fits = CheckKeyframes(run.map, folder); !fits) return Forward(fits);
-  run.map.confidence = std::move(saved->confidence);
-  run.map.intensity = std::move(saved->intensity);
+  EnsureKeyframes(read->map);
+  run.map = SurfelsOf(std::move(read->map));
   run.broken = DropBroken(run.map);
   if (run.map.Size() > 0) return run;
   return Fail(ErrorCode::kInput,
               "{}: holds no Gaussians that can be drawn, so there is no surface",
-              (folder / "map.ply").string());
+              run_or_map.string());
+}
+
+Result<SensorModel> SensorOfRun(const FinishedRun& run, const fs::path& run_or_map) {
+  if (run.sensor) return *run.sensor;
+  return Fail(ErrorCode::kInput,
+              "{}: does not say which sensor and keyframes it was made from; name the run's folder "
+              "instead, or a .csmap that `covsplat export` made of it",
+              run_or_map.string());
+}
+
+fs::path FolderOfRun(const fs::path& run_or_map) {
+  return IsFile(run_or_map) ? run_or_map.parent_path() : run_or_map;
 }
 
 }  // namespace covsplat

@@ -8,7 +8,7 @@
 
 #include "covsplat/io/output_file.hpp"
 #include "covsplat/io/trajectory_file.hpp"
-#include "covsplat/mapping/map_file.hpp"
+#include "covsplat/mapping/map_ply.hpp"
 #include "covsplat/report/report.hpp"
 
 namespace covsplat {

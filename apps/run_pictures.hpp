@@ -5,7 +5,7 @@
 
 #include "apps/run_results.hpp"
 
-#include "covsplat/mapping/map_file.hpp"
+#include "covsplat/mapping/saved_map.hpp"
 
 namespace covsplat {
 

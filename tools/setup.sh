@@ -6,7 +6,7 @@ set -euo pipefail
 packages=(
   build-essential cmake ninja-build python3
   libeigen3-dev libfmt-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev libhwy-dev libembree-dev
-  libassimp-dev libnanoflann-dev libpng-dev liblzf-dev libexpected-dev libgtest-dev
+  libassimp-dev libnanoflann-dev libpng-dev liblzf-dev zlib1g-dev libexpected-dev libgtest-dev
   libbenchmark-dev
 )
 for argument in "$@"; do

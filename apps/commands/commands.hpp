@@ -17,7 +17,7 @@ void AddDemoCommand(CLI::App& app, int& exit_code);
 /// simulate <world>
 void AddSimulateCommand(CLI::App& app, int& exit_code);
 
-/// info <recording | map.ply | run folder>
+/// info <recording | map file | run folder>
 void AddInfoCommand(CLI::App& app, int& exit_code);
 
 /// eval traj | map
@@ -29,13 +29,13 @@ void AddEvalTrajectoryCommand(CLI::App& eval, int& exit_code);
 /// eval map <mesh or cloud> <truth>
 void AddEvalMapCommand(CLI::App& eval, int& exit_code);
 
-/// mesh <run folder>
+/// mesh <run folder | map file>
 void AddMeshCommand(CLI::App& app, int& exit_code);
 
-/// render <run folder>
+/// render <run folder | map file>
 void AddRenderCommand(CLI::App& app, int& exit_code);
 
-/// export <run folder>
+/// export <run folder | map file>
 void AddExportCommand(CLI::App& app, int& exit_code);
 
 /// bench kitti | newer_college | oxford_spires

@@ -56,8 +56,8 @@ ExitCode Info(const std::string& path, bool json) {
 void AddInfoCommand(CLI::App& app, int& exit_code) {
   const auto path = std::make_shared<std::string>();
   const auto json = std::make_shared<bool>(false);
-  CLI::App* info = app.add_subcommand("info", "Show what a recording, a map.ply or a run holds");
-  info->add_option("path", *path, "Folder of scans, map.ply, or folder of a run")
+  CLI::App* info = app.add_subcommand("info", "Show what a recording, a map or a run holds");
+  info->add_option("path", *path, "Folder of scans, map (.csmap, .ply, .spz), or folder of a run")
       ->type_name("")
       ->required();
   info->add_flag("--json", *json, "Print JSON");

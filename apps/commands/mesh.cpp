@@ -58,7 +58,10 @@ void PrintSummary(const MeshResult& result, const std::filesystem::path& out) {
 }
 
 /// Ctrl-C ends it with nothing written.
-Result<MeshResult> FuseViews(const FinishedRun& run, const MeshConfig& config, bool quiet) {
+Result<MeshResult> FuseViews(const FinishedRun& run,
+                             const SensorModel& sensor,
+                             const MeshConfig& config,
+                             bool quiet) {
   const InterruptGuard guard;
   Progress::Options progress_options;
   progress_options.quiet = quiet;
@@ -80,7 +83,7 @@ Result<MeshResult> FuseViews(const FinishedRun& run, const MeshConfig& config, b
   const SlamConfig& slam = run.config.slam;
   Result<MeshResult> result = MeshOfMap(run.map,
                                         ChooseViews(run.map, run.trajectory, config.view.spacing_m),
-                                        run.sensor,
+                                        sensor,
                                         slam.system.backend,
                                         slam.mapper.engine.raster,
                                         config,
@@ -89,21 +92,28 @@ Result<MeshResult> FuseViews(const FinishedRun& run, const MeshConfig& config, b
   return result;
 }
 
+/// Poisson needs the Gaussians alone, fusion also where they were seen from.
+Result<MeshResult> MakeMesh(const MeshOptions& options,
+                            const FinishedRun& run,
+                            const MeshConfig& config) {
+  if (config.method == MeshMethod::kPoisson) return PoissonOfMap(run.map, config);
+  const Result<SensorModel> sensor = SensorOfRun(run, options.run);
+  if (!sensor) return Forward(sensor);
+  return FuseViews(run, *sensor, config, options.quiet);
+}
+
 ExitCode RunMesh(const MeshOptions& options) {
   const Result<MeshConfig> config = ConfigOf(options);
   if (!config) return ReportError(config.error());
-  const std::filesystem::path folder = options.run;
-  const std::filesystem::path out =
-      options.out.empty() ? folder / "mesh.ply" : std::filesystem::path(options.out);
+  const std::filesystem::path out = options.out.empty() ? FolderOfRun(options.run) / "mesh.ply"
+                                                        : std::filesystem::path(options.out);
   if (const auto format = MeshFormatOf(out); !format) return ReportError(format.error());
-  const Result<FinishedRun> run = ReadRun(folder);
+  const Result<FinishedRun> run = ReadRun(options.run);
   if (!run) return ReportError(run.error());
   if (run->broken > 0) {
     ReportWarning(fmt::format("{} Gaussians that are not finite are left out", run->broken));
   }
-  const Result<MeshResult> result = config->method == MeshMethod::kPoisson
-                                        ? PoissonOfMap(run->map, *config)
-                                        : FuseViews(*run, *config, options.quiet);
+  const Result<MeshResult> result = MakeMesh(options, *run, *config);
   if (!result) return ReportError(result.error());
   if (result->interrupted) return kExitInterrupted;
   if (const auto written = WriteMesh(out, result->mesh); !written) {
@@ -118,7 +128,7 @@ ExitCode RunMesh(const MeshOptions& options) {
 void AddMeshCommand(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<MeshOptions>();
   CLI::App* mesh = app.add_subcommand("mesh", "Make a triangle mesh of a finished run's map");
-  mesh->add_option("run", options->run, "Folder that `covsplat run` wrote")
+  mesh->add_option("run", options->run, "Folder that `covsplat run` wrote, or a .csmap")
       ->type_name("")
       ->required();
   mesh->add_option("-o,--out",

@@ -31,7 +31,7 @@ struct RenderOptions {
 };
 
 Result<SensorModel> SensorFor(const RenderOptions& options, const FinishedRun& run) {
-  if (options.sensor.empty()) return run.sensor;
+  if (options.sensor.empty()) return SensorOfRun(run, options.run);
   return FindSensorPreset(options.sensor).and_then(SensorModelOf);
 }
 
@@ -44,6 +44,10 @@ Result<Trajectory> PosesFor(const RenderOptions& options, const FinishedRun& run
     if (!given) return given;
     if (given->empty()) return Fail(ErrorCode::kInput, "{}: has no poses", options.poses);
     all = std::move(*given);
+  }
+  if (all.empty()) {
+    return Fail(
+        ErrorCode::kInput, "{}: knows no poses to look from; name some with --poses", options.run);
   }
   Trajectory chosen;
   for (std::size_t i = 0; i < all.size(); i += static_cast<std::size_t>(options.every)) {
@@ -95,9 +99,8 @@ ExitCode RunRender(const RenderOptions& options) {
   const auto engine =
       MakeMapEngine(run->map, slam.system.backend, *sensor, slam.mapper.engine, pool);
   if (!engine) return ReportError(engine.error());
-  const std::filesystem::path out = options.out.empty()
-                                        ? std::filesystem::path(options.run) / "render"
-                                        : std::filesystem::path(options.out);
+  const std::filesystem::path out = options.out.empty() ? FolderOfRun(options.run) / "render"
+                                                        : std::filesystem::path(options.out);
   Result<RenderWriter> writer = RenderWriter::Create(out, options.overwrite);
   if (!writer) return ReportError(writer.error());
   const InterruptGuard guard;
@@ -119,7 +122,10 @@ void AddRenderCommand(CLI::App& app, int& exit_code) {
   const auto o = std::make_shared<RenderOptions>();
   CLI::App* render =
       app.add_subcommand("render", "Show a finished run's map as a LiDAR would see it");
-  render->add_option("run", o->run, "Folder that `covsplat run` wrote")->type_name("")->required();
+  render
+      ->add_option("run", o->run, "Folder that `covsplat run` wrote, or a map: .csmap, .ply, .spz")
+      ->type_name("")
+      ->required();
   render
       ->add_option("--poses",
                    o->poses,

@@ -1,37 +1,32 @@
-// map.ply: the map as 3DGS viewers read it, with our own signals as further properties.
+// Map files of every format: one door to read them, one to write them.
 #pragma once
 
 #include <filesystem>
-#include <string_view>
+#include <string>
 
-#include "covsplat/mapping/gaussian_map.hpp"
+#include "covsplat/core/result.hpp"
+#include "covsplat/mapping/saved_map.hpp"
 
 namespace covsplat {
 
-/// What a file holds of a map: Gaussians in the map frame, one row each, without padding.
-struct SavedMap {
-  GaussianColumns<float> gaussians;
-  std::vector<float> confidence;     ///< u
-  std::vector<float> control_score;  ///< c, -1 where unknown
-  std::vector<float> intensity;      ///< mean of its measurements, 0 if the recording has none
-  std::vector<int> keyframe;         ///< that the Gaussian came with
-  std::vector<int> last_seen;        ///< keyframe that last agreed with it
-
-  std::size_t Size() const { return gaussians.Size(); }
+enum class MapFormat {
+  kPly,      ///< 3D Gaussians with our signals (map_ply.hpp)
+  kSpz,      ///< what viewers need, small (map_spz.hpp)
+  kCompact,  ///< .csmap: everything, small (compact_map.hpp)
 };
 
-/// All Gaussians, moved from their keyframes' frames to the map frame.
-SavedMap FlattenMap(const GaussianMap& map);
+/// By the end of the name; the error says which there are.
+Result<MapFormat> MapFormatOf(const std::filesystem::path& path);
 
-Eigen::Vector3f NormalOf(const GaussianColumns<float>& gaussians, std::size_t row);
+struct MapFile {
+  std::string format;  ///< with its version, for people
+  SavedMap map;
+};
 
-/// Writes binary little-endian floats, at once: x y z, normal, colour (from the normal, as f_dc),
-/// opacity (logit), scale_0 to 2 (logarithm; the third is the thickness of the disc), rot_0 to 3
-/// (w x y z), confidence, control_score, intensity, keyframe, last_seen.
-Result<void> WriteMapPly(const std::filesystem::path& path, const SavedMap& map);
+/// Tells the format by the file's first bytes, whatever its name.
+Result<MapFile> ReadMapFile(const std::filesystem::path& path);
 
-/// Reads what WriteMapPly wrote. Of other files of 3D Gaussians it reads what they have: signals
-/// that are missing are 0, keyframes -1.
-Result<SavedMap> ReadMapPly(const std::filesystem::path& path);
+/// Writes the file at once.
+Result<void> WriteMapFile(const std::filesystem::path& path, MapFormat format, const SavedMap& map);
 
 }  // namespace covsplat

@@ -7,15 +7,6 @@
 namespace covsplat {
 namespace {
 
-bool IsSound(const GaussianColumns<float>& table, std::size_t i) {
-  for (int p = 0; p < kParameterCount; ++p) {
-    if (!std::isfinite(table.Column(p)[i])) return false;
-  }
-  double norm = 0.0;
-  for (int p = kQuatW; p <= kQuatZ; ++p) norm += std::pow(table.Column(p)[i], 2.0);
-  return norm > 1e-6;
-}
-
 /// Row `i` of a table in the map frame becomes row `row` of a table in another frame.
 void MoveInto(const SE3& T_anchor_map,
               const GaussianColumns<float>& from,

@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "covsplat/mapping/map_file.hpp"
+#include "covsplat/mapping/saved_map.hpp"
 #include "covsplat/report/png.hpp"
 
 namespace covsplat {

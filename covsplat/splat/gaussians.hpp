@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -79,6 +80,14 @@ inline Eigen::Quaternionf RotationOf(const GaussianColumns<float>& gaussians, st
           gaussians.Column(kQuatX)[row],
           gaussians.Column(kQuatY)[row],
           gaussians.Column(kQuatZ)[row]};
+}
+
+/// Whether it can be drawn: all numbers are finite, and its rotation has a length.
+inline bool IsSound(const GaussianColumns<float>& gaussians, std::size_t row) {
+  for (int p = 0; p < kParameterCount; ++p) {
+    if (!std::isfinite(gaussians.Column(p)[row])) return false;
+  }
+  return RotationOf(gaussians, row).norm() > 1e-3f;
 }
 
 /// Gaussians [begin, end) of a table live in the frame of one anchor. `begin` is a multiple of

@@ -140,6 +140,68 @@ def a_finished_run_becomes_meshes_clouds_and_renderings(bench):
 
 
 @case
+def maps_convert_between_all_formats_and_every_verb_reads_them(bench):
+    expect(bench.run(bench.good, "converted", "--threads", "2"), 0)
+    run = bench.folder / "converted"
+    coarse = ["--voxel", "0.3", "-s", "view.columns=256", "--quiet"]
+    count = json.loads(bench.call("info", run / "map.ply", "--json").stdout)["gaussians"]
+    for source, target in [(run, "a.csmap"), ("a.csmap", "b.ply"), ("b.ply", "c.spz"),
+                           ("c.spz", "d.csmap"), ("d.csmap", "e.spz"), ("e.spz", "f.ply"),
+                           (run / "map.ply", "g.csmap")]:
+        expect(bench.call("export", source, "-o", target), 0, out="bytes each")
+        facts = json.loads(bench.call("info", target, "--json").stdout)
+        assert facts["gaussians"] == count, facts
+    # Only what a run or another .csmap says is known: not what a PLY or an SPZ leaves out.
+    facts = json.loads(bench.call("info", "a.csmap", "--json").stdout)
+    assert facts["bytes_per_gaussian"] < 20, facts  # a small map: its configuration weighs
+    assert "32 beams" in facts["sensor"] and facts["keyframe_poses"] == "in the file", facts
+    assert "control_score" in facts["signals"] and facts["keyframes"] >= 1, facts
+    expect(bench.call("info", "a.csmap"), 0, out="csmap, version 1")
+    expect(bench.call("info", "c.spz"), 0, out="spz, version 3")
+    # A .csmap stands for the run it was made of ...
+    expect(bench.call("mesh", "a.csmap", "-o", "whole.ply", *coarse), 0)
+    expect(bench.call("render", "a.csmap", "-o", "a.seen"), 0, out="32 x ")
+    # ... also in its folder, when map.ply has gone.
+    expect(bench.call("export", run, "-o", run / "map.csmap"), 0)
+    (run / "map.ply").unlink()
+    expect(bench.call("mesh", run, "-o", "again.ply", *coarse), 0)
+    expect(bench.call("export", run), 0, out="points")
+    # Other maps lack the sensor and the way, which can be given.
+    for name in ["b.ply", "c.spz"]:
+        expect(bench.call("mesh", name, *coarse), 3, err="a .csmap")
+        expect(bench.call("render", name, "-o", "x"), 3, err="a .csmap")
+        expect(bench.call("render", name, "-o", "x", "--sensor", "vlp-16"), 3, err="--poses")
+        expect(bench.call("render", name, "-o", name + ".seen", "--sensor", "vlp-16", "--poses",
+                          run / "trajectory_tum.txt", "--every", "6"), 0, out="16 x ")
+
+
+@case
+def exports_say_what_they_write_and_what_is_wrong(bench):
+    expect(bench.run(bench.good, "exported", "--threads", "2"), 0)
+    expect(bench.call("export", "exported", "-o", "a.ply"), 0, out="points")
+    expect(bench.call("info", "a.ply"), 3, err="not a map of Gaussians")
+    expect(bench.call("export", "exported", "-o", "a.ply", "--as", "gaussians"), 0, out="Gaussians")
+    expect(bench.call("export", "a.ply", "-o", "b.ply", "--as", "points"), 0, out="points")
+    expect(bench.call("export", "a.ply", "-o", "b.pcd"), 0, out="points")
+    expect(bench.call("export", "exported", "-o", "b.pcd", "--as", "gaussians"), 2, err=".csmap")
+    expect(bench.call("export", "exported", "-o", "b.spz", "--as", "points"), 2, err=".pcd")
+    expect(bench.call("export", "exported", "-o", "some.csmap", "--min-opacity", "0.5"), 0)
+    expect(bench.call("export", "exported", "-o", "all.csmap"), 0)
+    some, all_of_it = [(bench.folder / name).read_bytes() for name in ["some.csmap", "all.csmap"]]
+    assert len(some) < len(all_of_it)
+    (bench.folder / "bad.csmap").write_bytes(all_of_it[:-40] + b"?" + all_of_it[-39:])
+    (bench.folder / "cut.csmap").write_bytes(all_of_it[:-40])
+    (bench.folder / "new.csmap").write_bytes(b"CSMAP")
+    for name, error in [("bad", "checksum differs"), ("cut", "truncated"), ("new", "truncated")]:
+        for call in [["info"], ["export", "-o", "x.ply"], ["mesh"], ["render", "-o", "x"]]:
+            expect(bench.call(*call, name + ".csmap"), 3, err=f"{name}.csmap: ")
+    for name in ["full.csmap", "full.spz"]:
+        (bench.folder / (name + ".tmp")).symlink_to("/dev/full")
+        expect(bench.call("export", "exported", "-o", name), 4, err="No space left on device")
+        assert not (bench.folder / name).exists()
+
+
+@case
 def broken_runs_are_input_errors_that_name_the_file(bench):
     expect(bench.run(bench.good, "whole"), 0)
     whole = bench.folder / "whole"

@@ -9,8 +9,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "covsplat/io/compression.hpp"
 #include "covsplat/io/ply.hpp"
 #include "covsplat/mapping/held_out.hpp"
+#include "covsplat/mapping/map_ply.hpp"
 
 namespace covsplat {
 namespace {
@@ -102,7 +104,7 @@ TEST_F(MapFileTest, HeaderIsWhatViewersKnow) {
   std::ostringstream bytes;
   bytes << std::ifstream(folder_ / "map.ply", std::ios::binary).rdbuf();
   EXPECT_EQ(bytes.str().substr(0, std::string(kHeader).size()), kHeader);
-  EXPECT_EQ(bytes.str().size(), std::string(kHeader).size() + 3 * 22 * sizeof(float));
+  EXPECT_EQ(bytes.str().size(), std::string(kHeader).size() + std::size_t{3} * 22 * sizeof(float));
 }
 
 TEST_F(MapFileTest, NormalColourAndThicknessFollowTheGaussian) {
@@ -121,8 +123,10 @@ TEST_F(MapFileTest, NormalColourAndThicknessFollowTheGaussian) {
 TEST_F(MapFileTest, ReadsBackWhatWasWritten) {
   const SavedMap saved = FlattenMap(map_);
   ASSERT_TRUE(WriteMapPly(folder_ / "map.ply", saved));
-  const Result<SavedMap> read = ReadMapPly(folder_ / "map.ply");
-  ASSERT_TRUE(read) << read.error().message;
+  const Result<MapFile> file = ReadMapFile(folder_ / "map.ply");
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file->format, "ply");
+  const SavedMap* read = &file->map;
   ASSERT_EQ(read->Size(), saved.Size());
   for (int p = 0; p < kParameterCount; ++p) {
     for (std::size_t i = 0; i < saved.Size(); ++i) {
@@ -141,16 +145,88 @@ TEST_F(MapFileTest, OtherPlyFilesAreRefusedByName) {
   PointTable points;
   points.columns.push_back({"x", std::vector<float>{1.0f}});
   ASSERT_TRUE(WritePly(folder_ / "points.ply", points));
-  const Result<SavedMap> read = ReadMapPly(folder_ / "points.ply");
+  const Result<MapFile> read = ReadMapFile(folder_ / "points.ply");
   ASSERT_FALSE(read);
   EXPECT_NE(read.error().message.find("points.ply: has no property y"), std::string::npos);
 }
 
 TEST_F(MapFileTest, AnEmptyMapIsAFile) {
   ASSERT_TRUE(WriteMapPly(folder_ / "empty.ply", SavedMap()));
-  const Result<SavedMap> read = ReadMapPly(folder_ / "empty.ply");
+  const Result<MapFile> read = ReadMapFile(folder_ / "empty.ply");
   ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(read->Size(), 0u);
+  EXPECT_EQ(read->map.Size(), 0u);
+}
+
+TEST_F(MapFileTest, EveryFormatIsToldByItsBytesWhateverItsName) {
+  const SavedMap saved = FlattenMap(map_);
+  for (const auto& [format, name] : {std::pair(MapFormat::kPly, "ply"),
+                                     std::pair(MapFormat::kSpz, "spz, version 3"),
+                                     std::pair(MapFormat::kCompact, "csmap, version 1")}) {
+    ASSERT_TRUE(WriteMapFile(folder_ / "map", format, saved));
+    const Result<MapFile> read = ReadMapFile(folder_ / "map");
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->format, name);
+    EXPECT_EQ(read->map.Size(), 3u);
+    EXPECT_FALSE(fs::exists(folder_ / "map.tmp"));
+  }
+}
+
+TEST_F(MapFileTest, NamesTellTheFormatToWrite) {
+  EXPECT_EQ(MapFormatOf("a/b.ply").value(), MapFormat::kPly);
+  EXPECT_EQ(MapFormatOf("a.spz").value(), MapFormat::kSpz);
+  EXPECT_EQ(MapFormatOf("a.csmap").value(), MapFormat::kCompact);
+  EXPECT_EQ(MapFormatOf("a.las").error().code, ErrorCode::kUsage);
+  EXPECT_NE(MapFormatOf("a.las").error().message.find(".csmap"), std::string::npos);
+}
+
+TEST_F(MapFileTest, WhatIsNoMapIsRefusedByName) {
+  const auto error_of = [&](std::string_view bytes) {
+    std::ofstream(folder_ / "odd", std::ios::binary) << bytes;
+    const Result<MapFile> read = ReadMapFile(folder_ / "odd");
+    return read ? "no error" : read.error().message;
+  };
+  const auto says = [&](std::string_view bytes, const char* part) {
+    const std::string error = error_of(bytes);
+    EXPECT_NE(error.find("odd: "), std::string::npos) << error;
+    EXPECT_NE(error.find(part), std::string::npos) << error;
+  };
+  says("", "is empty");
+  says("hello", "neither");
+  says("CSMAP\n\x1a and more", "copied as text");  // without its carriage return
+  says("NGSP\x04 and more", "SPZ of version 4");
+  says(Gzip("text"), "neither an SPZ file");
+  EXPECT_NE(ReadMapFile(folder_ / "missing").error().message.find("missing"), std::string::npos);
+}
+
+TEST_F(MapFileTest, OtherGaussiansGetTheirThinnestAxisForANormal) {
+  PointTable table;
+  const auto add = [&](const char* name, float value) {
+    table.columns.push_back({name, std::vector<float>{value}});
+  };
+  for (const char* name : {"x", "y", "z", "opacity", "rot_1", "rot_2", "rot_3"}) add(name, 0.0f);
+  add("rot_0", 1.0f);
+  add("scale_0", -8.0f);
+  add("scale_1", -2.0f);
+  add("scale_2", -3.0f);
+  add("keyframe", kNaN);
+  ASSERT_TRUE(WritePly(folder_ / "other.ply", table));
+  const Result<MapFile> read = ReadMapFile(folder_ / "other.ply");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_TRUE(NormalOf(read->map.gaussians, 0).isApprox(Eigen::Vector3f::UnitX(), 1e-6f));
+  EXPECT_EQ(read->map.gaussians.Column(kLogScaleU)[0], -2.0f);
+  EXPECT_EQ(read->map.control_score[0], -1.0f);
+  EXPECT_EQ(read->map.keyframe[0], -1);
+}
+
+TEST_F(MapFileTest, AFailedWriteLeavesTheOldFile) {
+  ASSERT_TRUE(WriteMapFile(folder_ / "map.csmap", MapFormat::kCompact, FlattenMap(map_)));
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  fs::create_symlink("/dev/full", folder_ / "map.csmap.tmp");
+  const auto written = WriteMapFile(folder_ / "map.csmap", MapFormat::kCompact, SavedMap());
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, ErrorCode::kOutput);
+  EXPECT_NE(written.error().message.find("No space left"), std::string::npos);
+  EXPECT_EQ(ReadMapFile(folder_ / "map.csmap").value().map.Size(), 3u);
 }
 
 TEST_F(MapFileTest, ACopiedEngineShowsTheSame) {

@@ -1,7 +1,8 @@
 // Checks that a map.ply opens in Spark: loads it with the reader of @sparkjsdev/spark and compares
-// every splat with what stands in the file.
+// every splat with what stands in the file. Of an SPZ file that `covsplat export` made of that map,
+// it compares every splat with the map.ply as well.
 //
-//   node tools/check_map_ply.mjs map.ply      (make check-map MAP=map.ply installs what it needs)
+//   node tools/check_map.mjs map.ply [map.spz]     (make check-map MAP=folder/map.ply does all)
 //
 // Exit code 0: Spark sees what was written; 1: it does not, or a property is missing; 2: usage.
 import { resolveObjectURL } from "node:buffer";
@@ -22,6 +23,11 @@ const FLOAT_TYPES = ["float", "float32"];
 const SH_C0 = 0.28209479177387814;
 // Spark's ExtSplats keep positions as float32, the rest as half floats and 32-bit quaternions.
 const TOLERANCE = { position: 0, ln_scale: 0.01, opacity: 0.001, color: 0.005, rotation_rad: 0.01 };
+// Half a step of SPZ, and the above.
+const SPZ_TOLERANCE = {
+  position: 0.5 / 4096 + 1e-5, ln_scale: 0.5 / 16 + 0.01, opacity: 0.5 / 255 + 0.001,
+  color: 0.5 / 255 / 0.15 * SH_C0 + 0.005, rotation_rad: 0.015,
+};
 
 function parseHeader(bytes) {
   const text = bytes.subarray(0, 65536).toString("latin1");
@@ -125,6 +131,19 @@ async function loadWithSpark(path, bytes) {
   }
 }
 
+/** The map's frame (forward, left, up) turned to SPZ's (right, up, back). */
+function columnsInSpzFrame(c) {
+  const negated = (column) => column.map((value) => -value);
+  const [w, x, y, z] = [c.rot_0, c.rot_1, c.rot_2, c.rot_3];
+  // (w x y z) = (0.5 -0.5 0.5 0.5) takes the map's x to -z, y to -x and z to y.
+  const turned = (f) => w.map((_, i) => 0.5 * f(w[i], x[i], y[i], z[i]));
+  return {
+    ...c, x: negated(c.y), y: c.z, z: negated(c.x),
+    rot_0: turned((w, x, y, z) => w + x - y - z), rot_1: turned((w, x, y, z) => x - w + z - y),
+    rot_2: turned((w, x, y, z) => y + w + z + x), rot_3: turned((w, x, y, z) => z + w - y - x),
+  };
+}
+
 /** Spark's splat next to the file's: the differences by kind. */
 function differences(splat, c, i) {
   const rotation = [c.rot_1[i], c.rot_2[i], c.rot_3[i], c.rot_0[i]];
@@ -147,7 +166,7 @@ function differences(splat, c, i) {
   };
 }
 
-function compare(splats, columns, count) {
+function compare(splats, columns, count, tolerance) {
   const problems = [];
   if (splats.numSplats !== count) {
     return [`Spark found ${splats.numSplats} splats, the file has ${count}`];
@@ -156,7 +175,7 @@ function compare(splats, columns, count) {
     const bad = columns[name].findIndex((value) => !Number.isFinite(value));
     if (bad >= 0) problems.push(`${name} of splat ${bad} is ${columns[name][bad]}`);
   }
-  const worst = Object.fromEntries(Object.keys(TOLERANCE).map((kind) => [kind, { gap: 0, at: 0 }]));
+  const worst = Object.fromEntries(Object.keys(tolerance).map((kind) => [kind, { gap: 0, at: 0 }]));
   for (let i = 0; i < count; ++i) {
     for (const [kind, gap] of Object.entries(differences(splats.getSplat(i), columns, i))) {
       const known = Number.isNaN(worst[kind].gap);  // NaN is worst and stays
@@ -164,14 +183,14 @@ function compare(splats, columns, count) {
     }
   }
   for (const [kind, { gap, at }] of Object.entries(worst)) {
-    const good = gap <= TOLERANCE[kind];
+    const good = gap <= tolerance[kind];
     console.log(`  ${kind.padEnd(12)} differs by at most ${gap.toPrecision(3)} (splat ${at})`);
-    if (!good) problems.push(`${kind} differs by ${gap} at splat ${at}, not ${TOLERANCE[kind]}`);
+    if (!good) problems.push(`${kind} differs by ${gap} at splat ${at}, not ${tolerance[kind]}`);
   }
   return problems;
 }
 
-async function check(path) {
+async function check(path, spzPath) {
   const bytes = readFileSync(path);
   const header = parseHeader(bytes);
   const names = header.properties.map((p) => p.name);
@@ -181,21 +200,27 @@ async function check(path) {
   const unseen = EXPECTED.filter((name) => !names.includes(name));
   if (unseen.length > 0) console.log(`  not there, though covsplat writes them: ${unseen.join(" ")}`);
   if (problems.length > 0) return problems;
-  const splats = await loadWithSpark(path, bytes);
-  return compare(splats, parseColumns(bytes, header), header.count);
+  const columns = parseColumns(bytes, header);
+  problems.push(...compare(await loadWithSpark(path, bytes), columns, header.count, TOLERANCE));
+  if (!spzPath) return problems;
+  const spzBytes = readFileSync(spzPath);
+  console.log(`${spzPath}: ${(spzBytes.length / header.count).toFixed(1)} bytes per splat`);
+  const spz = await loadWithSpark(spzPath, spzBytes);
+  const spzColumns = columnsInSpzFrame(columns);
+  return [...problems, ...compare(spz, spzColumns, header.count, SPZ_TOLERANCE)];
 }
 
-const [path, ...rest] = process.argv.slice(2);
+const [path, spzPath, ...rest] = process.argv.slice(2);
 if (!path || rest.length > 0) {
-  console.error("usage: node tools/check_map_ply.mjs map.ply");
+  console.error("usage: node tools/check_map.mjs map.ply [map.spz]");
   process.exit(2);
 }
 let problems;
 try {
-  problems = await check(path);
+  problems = await check(path, spzPath);
 } catch (error) {
   problems = [String(error?.message ?? error)];
 }
-for (const problem of problems) console.error(`${path}: ${problem}`);
+for (const problem of problems) console.error(`${[path, spzPath].join(" ")}: ${problem}`);
 console.log(problems.length === 0 ? "Spark reads it as written." : "Not as Spark needs it.");
 process.exit(problems.length === 0 ? 0 : 1);
