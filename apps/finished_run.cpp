@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/exit_code.hpp"
 #include "apps/sensor_choice.hpp"
+#include <fmt/format.h>
 
 #include "covsplat/config/config.hpp"
 #include "covsplat/io/text.hpp"
@@ -35,6 +37,13 @@ Result<void> CheckFolder(const fs::path& folder) {
                 name);
   }
   return {};
+}
+
+Result<AppConfig> ConfigOf(const std::string& yaml, const std::string& name) {
+  AppConfig config;
+  const Result<void> loaded = LoadYamlText(yaml, name, config);
+  if (!loaded) return Forward(loaded);
+  return config;
 }
 
 /// The one file of Gaussians in a run's folder.
@@ -70,9 +79,17 @@ Result<MapFile> ReadMapIn(const fs::path& folder) {
   if (!keyframes) return Forward(keyframes);
   Result<std::string> config = ReadFile(folder / "config.yaml");
   if (!config) return Forward(config);
+  const Result<AppConfig> resolved = ConfigOf(*config, (folder / "config.yaml").string());
+  if (!resolved) return Forward(resolved);
+  Result<SensorModel> sensor = SensorOf(resolved->slam);
+  if (!sensor) {
+    return Fail(
+        ErrorCode::kInput, "{}: {}", (folder / "config.yaml").string(), sensor.error().message);
+  }
   Result<MapFile> read = ReadMapFile(*file);
   if (!read) return read;
   read->map.keyframes = std::move(*keyframes);
+  read->map.sensor = std::move(*sensor);
   read->map.config_yaml = std::move(*config);
   const auto fits = CheckKeyframes(read->map, *file, "keyframes_tum.txt");
   if (!fits) return Forward(fits);
@@ -98,13 +115,13 @@ SurfelMap SurfelsOf(SavedMap map) {
   return surfels;
 }
 
-/// What the configuration says, if there is one; `name` stands for it in errors.
-Result<void> ApplyConfig(const std::string& yaml, const std::string& name, FinishedRun& run) {
+/// Settings of renderings. Those of another version may not be known any more.
+AppConfig ConfigOrDefaults(const std::string& yaml, const fs::path& run_or_map) {
   if (yaml.empty()) return {};
-  if (auto loaded = LoadYamlText(yaml, name, run.config); !loaded) return loaded;
-  const Result<SensorModel> sensor = SensorOf(run.config.slam);
-  if (!sensor) return Fail(ErrorCode::kInput, "{}: {}", name, sensor.error().message);
-  run.sensor = *sensor;
+  const Result<AppConfig> config = ConfigOf(yaml, "its configuration");
+  if (config) return *config;
+  ReportWarning(fmt::format(
+      "{}: the defaults are used, because of {}", run_or_map.string(), config.error().message));
   return {};
 }
 
@@ -123,13 +140,10 @@ Result<FinishedRun> ReadRun(const fs::path& run_or_map) {
   Result<MapFile> read = ReadRunMap(run_or_map);
   if (!read) return Forward(read);
   FinishedRun run;
-  const bool is_file = IsFile(run_or_map);
-  const std::string config_name = is_file ? run_or_map.string() + " (its configuration)"
-                                          : (run_or_map / "config.yaml").string();
-  const auto configured = ApplyConfig(read->map.config_yaml, config_name, run);
-  if (!configured) return Forward(configured);
+  run.config = ConfigOrDefaults(read->map.config_yaml, run_or_map);
+  run.sensor = std::move(read->map.sensor);
   run.trajectory = read->map.keyframes;
-  if (!is_file) {
+  if (!IsFile(run_or_map)) {
     Result<Trajectory> trajectory = ReadTum(run_or_map / "trajectory_tum.txt");
     if (!trajectory) return Forward(trajectory);
     run.trajectory = std::move(*trajectory);

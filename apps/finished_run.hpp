@@ -15,7 +15,7 @@ namespace covsplat {
 
 struct FinishedRun {
   AppConfig config;                   ///< as resolved; the defaults if a map file has none
-  std::optional<SensorModel> sensor;  ///< nothing if a map file has no configuration
+  std::optional<SensorModel> sensor;  ///< nothing if a map file does not know it
   Trajectory trajectory;              ///< map frame: of every tracked scan, or of the keyframes
   SurfelMap map;
   std::size_t broken = 0;  ///< Gaussians that were left out because they are not finite
@@ -27,7 +27,8 @@ struct FinishedRun {
 Result<MapFile> ReadRunMap(const std::filesystem::path& run_or_map);
 
 /// The same with trajectory_tum.txt, ready to be rendered. A map without keyframes gets one, at the
-/// origin.
+/// origin. If the configuration in a map file is not one of this version, a warning is printed and
+/// the defaults are used.
 Result<FinishedRun> ReadRun(const std::filesystem::path& run_or_map);
 
 /// The sensor that made the map; the error says how to get a map that knows it.

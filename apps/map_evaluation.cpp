@@ -12,6 +12,7 @@
 #include "covsplat/eval/surface.hpp"
 #include "covsplat/io/scan_source.hpp"
 #include "covsplat/io/trajectory_file.hpp"
+#include "covsplat/mapping/map_file.hpp"
 
 namespace covsplat {
 namespace {
@@ -112,6 +113,20 @@ Result<ObservedSpace> Observe(const MapEvaluationRequest& request,
   return space;
 }
 
+/// Of a map in a format that is of maps only, the means of its Gaussians are the points.
+Result<Surface> LoadResult(const std::filesystem::path& path) {
+  const Result<MapFormat> format = MapFormatOf(path);
+  if (!format || *format == MapFormat::kPly) return LoadSurface(path);
+  const Result<MapFile> read = ReadMapFile(path);
+  if (!read) return Forward(read);
+  Surface surface;
+  for (std::size_t i = 0; i < read->map.Size(); ++i) {
+    surface.points.push_back(MeanOf(read->map.gaussians, i).cast<double>());
+  }
+  if (!surface.points.empty()) return surface;
+  return Fail(ErrorCode::kInput, "{}: holds no Gaussians, so there is no surface", path.string());
+}
+
 JudgedSurface Judged(const std::filesystem::path& path,
                      const Surface& surface,
                      std::size_t points) {
@@ -169,7 +184,7 @@ Result<MapEvaluation> EvaluateMap(const MapEvaluationRequest& request) {
     const Result<void> writable = CheckHeatmapFolder(*request.heatmap);
     if (!writable) return Forward(writable);
   }
-  const Result<Surface> result = LoadSurface(request.result);
+  const Result<Surface> result = LoadResult(request.result);
   if (!result) return Forward(result);
   const Result<Surface> truth = LoadSurface(request.truth);
   if (!truth) return Forward(truth);

@@ -5,11 +5,9 @@
 #include <numbers>
 
 #include "apps/facts.hpp"
-#include "apps/sensor_choice.hpp"
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "covsplat/config/config.hpp"
 #include "covsplat/io/text.hpp"
 #include "covsplat/mapping/map_file.hpp"
 
@@ -71,19 +69,15 @@ void AddSignals(const SavedMap& map, Json& facts) {
   facts["signals"] = signals.empty() ? Json("none") : signals;
 }
 
-Json SensorFacts(const std::string& config_yaml) {
-  AppConfig config;
-  if (!LoadYamlText(config_yaml, "config", config)) return "unknown to this version of covsplat";
-  const Result<SensorModel> sensor = SensorOf(config.slam);
-  if (!sensor) return "not known";
+std::string Describe(const SensorModel& sensor) {
   constexpr double kDegree = std::numbers::pi / 180.0;
   return fmt::format("{} beams from {:+.1f} to {:+.1f} deg, {} columns, ranges {:.1f} to {:.1f} m",
-                     sensor->Rows(),
-                     sensor->Elevations().front() / kDegree,
-                     sensor->Elevations().back() / kDegree,
-                     sensor->Columns(),
-                     sensor->MinRange(),
-                     sensor->MaxRange());
+                     sensor.Rows(),
+                     sensor.Elevations().front() / kDegree,
+                     sensor.Elevations().back() / kDegree,
+                     sensor.Columns(),
+                     sensor.MinRange(),
+                     sensor.MaxRange());
 }
 
 }  // namespace
@@ -103,8 +97,8 @@ Result<Json> MapFacts(const std::filesystem::path& file) {
     facts["bytes_per_gaussian"] =
         std::round(100.0 * static_cast<double>(bytes) / static_cast<double>(map.Size())) / 100.0;
   }
-  facts["sensor"] =
-      map.config_yaml.empty() ? Json("not in the file") : SensorFacts(map.config_yaml);
+  facts["sensor"] = map.sensor ? Describe(*map.sensor) : "not in the file";
+  facts["configuration"] = map.config_yaml.empty() ? "not in the file" : "in the file";
   facts["keyframe_poses"] = map.keyframes.empty() ? "not in the file" : "in the file";
   if (map.Size() == 0) return facts;
   facts["keyframes"] = 1 + *std::max_element(map.keyframe.begin(), map.keyframe.end());

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
+#include <numbers>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "covsplat/core/check.hpp"
@@ -18,6 +21,7 @@ constexpr std::size_t kHeaderBytes = 28;
 constexpr std::size_t kSectionHeadBytes = 12;
 constexpr std::size_t kTagBytes = 4;
 constexpr std::string_view kConfigTag = "CONF";
+constexpr std::string_view kSensorTag = "SENS";
 constexpr std::string_view kKeyframesTag = "KEYF";
 constexpr std::string_view kTileTag = "TILE";
 
@@ -55,6 +59,15 @@ std::string PackConfig(const std::string& yaml) {
   std::string bytes;
   AppendBinary(bytes, static_cast<std::uint32_t>(yaml.size()));
   return bytes + Deflate(yaml);
+}
+
+std::string PackSensor(const SensorModel& sensor) {
+  std::string bytes;
+  AppendBinary(bytes, static_cast<std::uint32_t>(sensor.Columns()));
+  AppendBinary(bytes, sensor.MinRange());
+  AppendBinary(bytes, sensor.MaxRange());
+  for (const double elevation_rad : sensor.Elevations()) AppendBinary(bytes, elevation_rad);
+  return bytes;
 }
 
 std::string PackKeyframes(const Trajectory& keyframes) {
@@ -158,6 +171,29 @@ std::optional<std::string> UnpackConfig(std::string_view payload) {
   return Inflate(reader.Take(reader.Left()), size);
 }
 
+std::optional<SensorModel> UnpackSensor(std::string_view payload) {
+  constexpr std::uint32_t kMaxColumns = 1 << 20;
+  BinaryReader reader(payload);
+  const auto columns = reader.Read<std::uint32_t>();
+  const auto min_range_m = reader.Read<double>();
+  const auto max_range_m = reader.Read<double>();
+  if (columns < 4 || columns % 4 != 0 || columns > kMaxColumns) return std::nullopt;
+  if (!(min_range_m >= 0.0 && min_range_m < max_range_m && std::isfinite(max_range_m))) {
+    return std::nullopt;
+  }
+  std::vector<double> elevation_rad;
+  double above = 0.5 * std::numbers::pi;
+  while (reader.Left() > 0 && !reader.Failed()) {
+    elevation_rad.push_back(reader.Read<double>());
+    if (!(elevation_rad.back() < above)) return std::nullopt;
+    above = elevation_rad.back();
+  }
+  if (reader.Failed() || elevation_rad.size() < 2 || !(above > -0.5 * std::numbers::pi)) {
+    return std::nullopt;
+  }
+  return SensorModel(std::move(elevation_rad), static_cast<int>(columns), min_range_m, max_range_m);
+}
+
 std::optional<Trajectory> UnpackKeyframes(std::string_view payload) {
   constexpr std::size_t kNumbers = 8;
   if (payload.size() % (kNumbers * sizeof(double)) != 0) return std::nullopt;
@@ -177,6 +213,7 @@ std::optional<Trajectory> UnpackKeyframes(std::string_view payload) {
 /// What the sections hold; tiles become one map at the end.
 struct Contents {
   Trajectory keyframes;
+  std::optional<SensorModel> sensor;
   std::string config_yaml;
   std::vector<SavedMap> tiles;
   std::uint64_t gaussians = 0;
@@ -189,6 +226,10 @@ bool AddSection(const Section& section, Contents& contents) {
     auto yaml = UnpackConfig(section.payload);
     if (yaml) contents.config_yaml = std::move(*yaml);
     return yaml.has_value();
+  }
+  if (section.tag == kSensorTag) {
+    contents.sensor = UnpackSensor(section.payload);
+    return contents.sensor.has_value();
   }
   if (section.tag == kKeyframesTag) {
     auto keyframes = UnpackKeyframes(section.payload);
@@ -212,6 +253,7 @@ void CopyTo(const std::vector<T>& from, std::size_t row, std::vector<T>& to) {
 SavedMap JoinTiles(Contents contents) {
   SavedMap map;
   map.keyframes = std::move(contents.keyframes);
+  map.sensor = std::move(contents.sensor);
   map.config_yaml = std::move(contents.config_yaml);
   map.Resize(contents.gaussians);
   std::size_t row = 0;
@@ -236,6 +278,7 @@ std::string PackCompactMap(const SavedMap& map) {
   if (!map.config_yaml.empty()) {
     sections.push_back(PackSection(kConfigTag, PackConfig(map.config_yaml)));
   }
+  if (map.sensor) sections.push_back(PackSection(kSensorTag, PackSensor(*map.sensor)));
   if (!map.keyframes.empty()) {
     sections.push_back(PackSection(kKeyframesTag, PackKeyframes(map.keyframes)));
   }

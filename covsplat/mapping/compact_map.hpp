@@ -1,4 +1,4 @@
-// .csmap: a map in 16 bytes or less per Gaussian, with its keyframes and configuration,
+// .csmap: a map in 16 bytes or less per Gaussian, with its keyframes, sensor and configuration,
 // checksummed. docs/map_format.md describes the bytes.
 #pragma once
 

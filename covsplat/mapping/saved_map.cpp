@@ -53,6 +53,7 @@ SavedMap SelectRows(const SavedMap& map, std::span<const std::size_t> rows) {
   SavedMap chosen;
   chosen.Resize(rows.size());
   chosen.keyframes = map.keyframes;
+  chosen.sensor = map.sensor;
   chosen.config_yaml = map.config_yaml;
   for (std::size_t to = 0; to < rows.size(); ++to) {
     const std::size_t from = rows[to];

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "covsplat/core/sensor_model.hpp"
 #include "covsplat/core/trajectory.hpp"
 #include "covsplat/mapping/gaussian_map.hpp"
 
@@ -23,8 +25,9 @@ struct SavedMap {
   std::vector<int> keyframe;         ///< that the Gaussian came with, -1 where unknown
   std::vector<int> last_seen;        ///< keyframe that last agreed with it, -1 where unknown
 
-  Trajectory keyframes;     ///< their poses in the map frame; empty where the file has none
-  std::string config_yaml;  ///< configuration of the run that made it; empty likewise
+  Trajectory keyframes;               ///< their poses in the map frame; empty if not known
+  std::optional<SensorModel> sensor;  ///< that made the map, if it is known
+  std::string config_yaml;            ///< of the run that made it; empty if not known
 
   std::size_t Size() const { return gaussians.Size(); }
   /// Of all columns; new rows have signals as where they are unknown.
@@ -32,7 +35,7 @@ struct SavedMap {
 };
 
 /// All Gaussians, moved from their keyframes' frames to the map frame. What GaussianMap does not
-/// know, the keyframes' times and the configuration, stays empty.
+/// know (the keyframes' times, the sensor, the configuration) stays empty.
 SavedMap FlattenMap(const GaussianMap& map);
 
 /// The map of some of its rows, in their order.

@@ -12,7 +12,9 @@ import subprocess
 import sys
 import tempfile
 import time
+import zlib
 
+import csmap
 from cases import LIMIT_S, binary, case, expect, run_cases
 
 SCANS = 12
@@ -151,12 +153,17 @@ def maps_convert_between_all_formats_and_every_verb_reads_them(bench):
         expect(bench.call("export", source, "-o", target), 0, out="bytes each")
         facts = json.loads(bench.call("info", target, "--json").stdout)
         assert facts["gaussians"] == count, facts
+    different = list(csmap.differences((bench.folder / "a.csmap").read_bytes(),
+                                       (bench.folder / "b.ply").read_bytes()))
+    assert not different, different[:5]
     # Only what a run or another .csmap says is known: not what a PLY or an SPZ leaves out.
     facts = json.loads(bench.call("info", "a.csmap", "--json").stdout)
     assert facts["bytes_per_gaussian"] < 20, facts  # a small map: its configuration weighs
     assert "32 beams" in facts["sensor"] and facts["keyframe_poses"] == "in the file", facts
     assert "control_score" in facts["signals"] and facts["keyframes"] >= 1, facts
     expect(bench.call("info", "a.csmap"), 0, out="csmap, version 1")
+    for name in ["a.csmap", "c.spz"]:
+        expect(bench.call("eval", "map", name, bench.good / "gt_mesh.ply"), 0, out="F-score")
     expect(bench.call("info", "c.spz"), 0, out="spz, version 3")
     # A .csmap stands for the run it was made of ...
     expect(bench.call("mesh", "a.csmap", "-o", "whole.ply", *coarse), 0)
@@ -195,6 +202,14 @@ def exports_say_what_they_write_and_what_is_wrong(bench):
     for name, error in [("bad", "checksum differs"), ("cut", "truncated"), ("new", "truncated")]:
         for call in [["info"], ["export", "-o", "x.ply"], ["mesh"], ["render", "-o", "x"]]:
             expect(bench.call(*call, name + ".csmap"), 3, err=f"{name}.csmap: ")
+    # A configuration with keys that this version does not know is no obstacle.
+    count, sections = csmap.sections(all_of_it)
+    assert sections[0][0] == "CONF", sections[0]
+    text = b"not_yet_known: 1\n"
+    sections[0] = ("CONF", struct.pack("<I", len(text)) + zlib.compress(text))
+    (bench.folder / "later.csmap").write_bytes(csmap.pack(count, sections))
+    expect(bench.call("render", "later.csmap", "-o", "later.seen", "--every", "9"), 0,
+           err="not_yet_known")
     for name in ["full.csmap", "full.spz"]:
         (bench.folder / (name + ".tmp")).symlink_to("/dev/full")
         expect(bench.call("export", "exported", "-o", name), 4, err="No space left on device")

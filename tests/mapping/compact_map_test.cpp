@@ -86,6 +86,11 @@ TEST(CompactMap, EverythingComesBackWithinHalfAStep) {
   EXPECT_EQ(read.keyframe, map.keyframe);
   EXPECT_EQ(read.last_seen, map.last_seen);
   EXPECT_EQ(read.config_yaml, map.config_yaml);
+  ASSERT_TRUE(read.sensor);
+  EXPECT_EQ(read.sensor->Elevations(), map.sensor->Elevations());
+  EXPECT_EQ(read.sensor->Columns(), 1024);
+  EXPECT_EQ(read.sensor->MinRange(), 0.5);
+  EXPECT_EQ(read.sensor->MaxRange(), 80.0);
   ASSERT_EQ(read.keyframes.size(), map.keyframes.size());
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
     EXPECT_EQ(read.keyframes[k].stamp_s, map.keyframes[k].stamp_s);
@@ -202,7 +207,7 @@ TEST(CompactMap, EveryTruncationIsFoundAndNamed) {
 TEST(CompactMap, DamageIsNamedByItsSection) {
   std::string bytes = PackCompactMap(RandomMap(20, 5.0, 7));
   bytes.back() = static_cast<char>(bytes.back() ^ 1);
-  EXPECT_NE(ErrorOf(bytes).find("is damaged in section 10 of 10 (TILE, from byte "),
+  EXPECT_NE(ErrorOf(bytes).find("is damaged in section 11 of 11 (TILE, from byte "),
             std::string::npos)
       << ErrorOf(bytes);
 }
@@ -254,6 +259,30 @@ TEST(CompactMap, ContentsThatNoWriterMakesAreErrors) {
             std::string::npos);  // a rotation of no length
 }
 
+TEST(CompactMap, SensorsThatCannotBeAreErrors) {
+  const auto error_of = [](std::uint32_t columns,
+                           double min_range_m,
+                           double max_range_m,
+                           const std::vector<double>& elevation_rad) {
+    std::string payload;
+    AppendBinary(payload, columns);
+    AppendBinary(payload, min_range_m);
+    AppendBinary(payload, max_range_m);
+    for (const double e : elevation_rad) AppendBinary(payload, e);
+    return ErrorOf(Header(1, 1, 0) + Section("SENS", payload));
+  };
+  constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(error_of(512, 0.5, 80.0, {0.1, -0.1}), "no error");
+  EXPECT_NE(error_of(510, 0.5, 80.0, {0.1, -0.1}).find("SENS"), std::string::npos);
+  EXPECT_NE(error_of(0xfffffffc, 0.5, 80.0, {0.1, -0.1}).find("SENS"), std::string::npos);
+  EXPECT_NE(error_of(512, 80.0, 0.5, {0.1, -0.1}).find("SENS"), std::string::npos);
+  EXPECT_NE(error_of(512, 0.5, kNoNumber, {0.1, -0.1}).find("SENS"), std::string::npos);
+  EXPECT_NE(error_of(512, 0.5, 80.0, {0.1}).find("SENS"), std::string::npos);
+  EXPECT_NE(error_of(512, 0.5, 80.0, {0.1, 0.1}).find("SENS"), std::string::npos);
+  EXPECT_NE(error_of(512, 0.5, 80.0, {0.1, kNoNumber}).find("SENS"), std::string::npos);
+  EXPECT_NE(error_of(512, 0.5, 80.0, {0.1, -2.0}).find("SENS"), std::string::npos);
+}
+
 /// Three Gaussians that say all there is to say; the file of version 1 beside it never changes.
 SavedMap GoldenMap() {
   SavedMap map;
@@ -268,7 +297,8 @@ SavedMap GoldenMap() {
   map.keyframe = {0, 1, 1};
   map.last_seen = {1, 1, -1};
   map.keyframes = {{10.5, SE3()}, {11.0, SE3(Eigen::Quaterniond(0.0, 0.0, 0.0, 1.0), {1, 2, 3})}};
-  map.config_yaml = "sensor:\n  columns: 1024\n";
+  map.sensor = SensorModel({0.25, 0.125, -0.5}, 512, 0.5, 100.0);
+  map.config_yaml = "sensor:\n  columns: 512\n";
   return map;
 }
 
@@ -291,6 +321,9 @@ TEST(CompactMap, FilesOfVersionOneAreReadForEver) {
   EXPECT_EQ(read.keyframe, map.keyframe);
   EXPECT_EQ(read.last_seen, map.last_seen);
   EXPECT_EQ(read.config_yaml, map.config_yaml);
+  ASSERT_TRUE(read.sensor);
+  EXPECT_EQ(read.sensor->Elevations(), map.sensor->Elevations());
+  EXPECT_EQ(read.sensor->Columns(), 512);
   ASSERT_EQ(read.keyframes.size(), 2u);
   EXPECT_EQ(read.keyframes[1].stamp_s, 11.0);
   EXPECT_TRUE(

@@ -30,8 +30,8 @@ inline void SetGaussian(SavedMap& map,
   }
 }
 
-/// Means within +-`extent_m`, every orientation, scales of 2 cm to 1 m, seven keyframes, and a
-/// configuration. Every tenth control score and intensity is unknown.
+/// Means within +-`extent_m`, every orientation, scales of 2 cm to 1 m, seven keyframes, a sensor
+/// and a configuration. Every tenth control score and intensity is unknown.
 inline SavedMap RandomMap(std::size_t size, double extent_m, std::uint64_t seed) {
   Rng rng(seed);
   const auto uniform = [&](double low, double high) {
@@ -58,6 +58,7 @@ inline SavedMap RandomMap(std::size_t size, double extent_m, std::uint64_t seed)
     const Eigen::Quaterniond q(1.0, 0.1 * k, 0.0, 0.2);
     map.keyframes.push_back({1e9 + 0.1 * k, SE3(q, Eigen::Vector3d(k, 0.5 * k, -0.1))});
   }
+  map.sensor = UniformSensorModel(16, 1024, -0.3, 0.3, 0.5, 80.0);
   map.config_yaml = "# made by a test\nsensor:\n  columns: 1024\n";
   return map;
 }
