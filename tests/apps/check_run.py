@@ -143,7 +143,7 @@ def a_finished_run_becomes_meshes_clouds_and_renderings(bench):
 
 @case
 def maps_convert_between_all_formats_and_every_verb_reads_them(bench):
-    expect(bench.run(bench.good, "converted", "--threads", "2"), 0)
+    expect(bench.run(bench.good, "converted", "--deterministic"), 0)
     run = bench.folder / "converted"
     coarse = ["--voxel", "0.3", "-s", "view.columns=256", "--quiet"]
     count = json.loads(bench.call("info", run / "map.ply", "--json").stdout)["gaussians"]
@@ -160,7 +160,7 @@ def maps_convert_between_all_formats_and_every_verb_reads_them(bench):
     facts = json.loads(bench.call("info", "a.csmap", "--json").stdout)
     assert facts["bytes_per_gaussian"] < 20, facts  # a small map: its configuration weighs
     assert "32 beams" in facts["sensor"] and facts["keyframe_poses"] == "in the file", facts
-    assert "control_score" in facts["signals"] and facts["keyframes"] >= 1, facts
+    assert "confidence" in facts["signals"] and facts["keyframes"] >= 1, facts
     expect(bench.call("info", "a.csmap"), 0, out="csmap, version 1")
     for name in ["a.csmap", "c.spz"]:
         expect(bench.call("eval", "map", name, bench.good / "gt_mesh.ply"), 0, out="F-score")
@@ -184,7 +184,7 @@ def maps_convert_between_all_formats_and_every_verb_reads_them(bench):
 
 @case
 def exports_say_what_they_write_and_what_is_wrong(bench):
-    expect(bench.run(bench.good, "exported", "--threads", "2"), 0)
+    expect(bench.run(bench.good, "exported", "--deterministic"), 0)
     expect(bench.call("export", "exported", "-o", "a.ply"), 0, out="points")
     expect(bench.call("info", "a.ply"), 3, err="not a map of Gaussians")
     expect(bench.call("export", "exported", "-o", "a.ply", "--as", "gaussians"), 0, out="Gaussians")
