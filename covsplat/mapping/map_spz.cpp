@@ -97,6 +97,34 @@ int FractionBitsFor(double farthest_m) {
   return bits;
 }
 
+/// The attributes of all Gaussians, one after the other, as the file has them.
+struct PackedBody {
+  std::string positions, alphas, colors, scales, rotations;
+};
+
+void AppendGaussian(const GaussianColumns<float>& table,
+                    std::size_t row,
+                    int fraction_bits,
+                    PackedBody& body) {
+  const Eigen::Quaterniond R_spz_map(SpzFromMap());
+  const Eigen::Vector3d position = R_spz_map * MeanOf(table, row).cast<double>();
+  const Eigen::Vector3d color = NormalOf(table, row).cast<double>().normalized();
+  const Eigen::Vector3d log_scale(
+      table.Column(kLogScaleU)[row], table.Column(kLogScaleV)[row], std::log(kThicknessM));
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto steps =
+        static_cast<std::uint32_t>(std::lround(std::ldexp(position[axis], fraction_bits)));
+    for (int shift = 0; shift < 24; shift += 8) {
+      body.positions.push_back(static_cast<char>(steps >> shift));
+    }
+    const double coefficient = 0.5 * color[axis] / kShOfColor;  // as in map.ply
+    AppendBinary(body.colors, ByteOf((coefficient * kColorSpread + 0.5) * 255.0));
+    AppendBinary(body.scales, ByteOf((log_scale[axis] + kScaleOffset) * kScaleSteps));
+  }
+  AppendBinary(body.alphas, ByteOf(255.0 * static_cast<double>(OpacityOf(table, row))));
+  AppendBinary(body.rotations, PackRotation(R_spz_map * RotationOf(table, row).cast<double>()));
+}
+
 Header ReadHeader(std::string_view bytes) {
   BinaryReader reader(bytes);
   Header header;
@@ -131,7 +159,7 @@ Result<void> CheckHeader(const Header& header, const std::string& file) {
   return {};
 }
 
-/// The attributes of all Gaussians, one after the other, each as the file has it.
+/// The same of a file that is read.
 struct Body {
   std::string_view positions, alphas, colors, scales, rotations;
 };
@@ -183,13 +211,13 @@ SavedMap MapOf(const Body& body, const Header& header) {
 }  // namespace
 
 Result<std::string> PackSpz(const SavedMap& map, const std::string& file) {
-  const GaussianColumns<float>& table = map.gaussians;
   std::vector<std::size_t> rows;
   double farthest_m = 0.0;
   for (std::size_t i = 0; i < map.Size(); ++i) {
-    if (!IsSound(table, i)) continue;
+    if (!IsSound(map.gaussians, i)) continue;
     rows.push_back(i);
-    farthest_m = std::max(farthest_m, static_cast<double>(MeanOf(table, i).cwiseAbs().maxCoeff()));
+    const float coordinate_m = MeanOf(map.gaussians, i).cwiseAbs().maxCoeff();
+    farthest_m = std::max(farthest_m, static_cast<double>(coordinate_m));
   }
   const int fraction_bits = FractionBitsFor(farthest_m);
   if (fraction_bits < 0) {
@@ -199,29 +227,8 @@ Result<std::string> PackSpz(const SavedMap& map, const std::string& file) {
         file,
         farthest_m);
   }
-  const Eigen::Quaterniond R_spz_map(SpzFromMap());
-  std::string positions, alphas, colors, scales, rotations;
-  for (const std::size_t i : rows) {
-    const Eigen::Vector3d position = R_spz_map * MeanOf(table, i).cast<double>();
-    const Eigen::Vector3f normal = NormalOf(table, i).normalized();
-    const std::array<float, 3> log_scale = {
-        table.Column(kLogScaleU)[i], table.Column(kLogScaleV)[i], std::log(kThicknessM)};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto axis = static_cast<Eigen::Index>(k);
-      const auto steps = static_cast<std::uint32_t>(
-          static_cast<std::int32_t>(std::lround(std::ldexp(position[axis], fraction_bits))));
-      for (int shift = 0; shift < 24; shift += 8) {
-        positions.push_back(static_cast<char>(steps >> shift));
-      }
-      const double coefficient = 0.5 * static_cast<double>(normal[axis]) / kShOfColor;
-      AppendBinary(colors, ByteOf((coefficient * kColorSpread + 0.5) * 255.0));
-      AppendBinary(scales,
-                   ByteOf((static_cast<double>(log_scale[k]) + kScaleOffset) * kScaleSteps));
-    }
-    AppendBinary(alphas, ByteOf(255.0 * static_cast<double>(OpacityOf(table, i))));
-    AppendBinary(rotations,
-                 PackRotation(R_spz_map * covsplat::RotationOf(table, i).cast<double>()));
-  }
+  PackedBody body;
+  for (const std::size_t row : rows) AppendGaussian(map.gaussians, row, fraction_bits, body);
   std::string bytes;
   AppendBinary(bytes, kMagic);
   AppendBinary(bytes, std::uint32_t{kWrittenVersion});
@@ -229,7 +236,7 @@ Result<std::string> PackSpz(const SavedMap& map, const std::string& file) {
   AppendBinary(bytes, std::uint8_t{0});  // degree of the spherical harmonics
   AppendBinary(bytes, static_cast<std::uint8_t>(fraction_bits));
   AppendBinary(bytes, std::uint16_t{0});  // flags, reserved
-  return Gzip(bytes + positions + alphas + colors + scales + rotations);
+  return Gzip(bytes + body.positions + body.alphas + body.colors + body.scales + body.rotations);
 }
 
 Result<SpzFile> ParseSpz(std::string_view bytes, const std::string& file) {
