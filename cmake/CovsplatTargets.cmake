@@ -2,13 +2,17 @@
 
 add_library(covsplat_options INTERFACE)
 target_include_directories(covsplat_options INTERFACE ${CMAKE_SOURCE_DIR})
-target_compile_options(covsplat_options INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
+target_compile_options(covsplat_options INTERFACE
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wconversion -Wshadow>
+  $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra,-Wshadow>)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # Every 64-bit x86 since 2009; hot kernels dispatch to AVX2 and AVX-512 at run time.
   target_compile_options(covsplat_options INTERFACE -march=x86-64-v2)
 endif()
 if(COVSPLAT_WERROR)
-  target_compile_options(covsplat_options INTERFACE -Werror)
+  target_compile_options(covsplat_options INTERFACE
+    $<$<COMPILE_LANGUAGE:CXX>:-Werror>
+    $<$<COMPILE_LANGUAGE:CUDA>:-Werror=all-warnings>)
 endif()
 if(COVSPLAT_SANITIZE)
   target_compile_options(covsplat_options INTERFACE

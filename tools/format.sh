@@ -9,4 +9,4 @@ case "${1:-}" in
   --check) mode=(--dry-run --Werror) ;;
   *) echo "usage: tools/format.sh [--check]" >&2; exit 2 ;;
 esac
-find covsplat apps tests bench -name '*.?pp' -print0 | xargs -0 -r clang-format-14 "${mode[@]}"
+find covsplat apps tests bench \( -name '*.?pp' -o -name '*.cu' -o -name '*.cuh' \) -print0 | xargs -0 -r clang-format-14 "${mode[@]}"

@@ -1,6 +1,7 @@
 #include "covsplat/splat/engine.hpp"
 
 #include "covsplat/splat/cpu/cpu_engine.hpp"
+#include "covsplat/splat/cuda/make_engine.hpp"
 
 namespace covsplat {
 
@@ -8,11 +9,13 @@ Result<std::unique_ptr<SplatEngine>> MakeSplatEngine(Backend backend,
                                                      const SensorModel& sensor,
                                                      const EngineConfig& config,
                                                      ThreadPool& pool) {
-  if (backend == Backend::kCuda) {
-    return Fail(ErrorCode::kUnavailable,
-                "this build has no CUDA backend; use --backend cpu (or auto)");
+  std::string device = "cpu";
+  if (backend == Backend::kCuda || (backend == Backend::kAuto && cuda::IsBuilt())) {
+    Result<std::unique_ptr<SplatEngine>> engine = cuda::MakeEngine(sensor, config);
+    if (engine || backend == Backend::kCuda) return engine;
+    device = fmt::format("cpu ({})", engine.error().message);
   }
-  return std::make_unique<CpuEngine>(sensor, config, pool);
+  return std::make_unique<CpuEngine>(sensor, config, std::move(device), pool);
 }
 
 }  // namespace covsplat

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "covsplat/core/image.hpp"
@@ -54,6 +55,9 @@ class SplatEngine {
  public:
   virtual ~SplatEngine() = default;
 
+  /// What does the work, for people: "cpu", or "cuda" with the device's name.
+  virtual std::string Device() const = 0;
+
   /// A new anchor at a pose; anchors are numbered from 0.
   virtual int AddAnchor(const SE3& T_map_anchor) = 0;
   /// Moves an anchor and, with it, exactly and at no cost, all its Gaussians and its view.
@@ -89,8 +93,8 @@ struct EngineConfig {
   }
 };
 
-/// The engine of a backend; kUnavailable if this build or machine does not have it. `pool` must
-/// outlive the engine.
+/// The engine of a backend; kUnavailable if this build or machine does not have it. `auto` takes
+/// CUDA where it can, else the CPU, whose Device() then says why. `pool` must outlive the engine.
 Result<std::unique_ptr<SplatEngine>> MakeSplatEngine(Backend backend,
                                                      const SensorModel& sensor,
                                                      const EngineConfig& config,

@@ -8,39 +8,9 @@
 
 #include <Eigen/Geometry>
 
+#include "covsplat/splat/parameters.hpp"
+
 namespace covsplat {
-
-/// Optimised parameters of a Gaussian. Its in-plane axes and normal are the columns of the rotation
-/// matrix of the unit quaternion; the standard deviations along the axes are exp(log scale) metres;
-/// its opacity is the logistic function of the logit. Mean and orientation are in the frame of the
-/// Gaussian's anchor (its keyframe).
-enum Parameter : int {
-  kMeanX,
-  kMeanY,
-  kMeanZ,
-  kQuatW,
-  kQuatX,
-  kQuatY,
-  kQuatZ,
-  kLogScaleU,
-  kLogScaleV,
-  kOpacityLogit,
-  kParameterCount
-};
-
-/// Directions in which a Gaussian is optimised: mean in its anchor's frame, rotation vector in its
-/// own frame (q <- q * exp(delta)), log scales, opacity logit.
-enum Tangent : int {
-  kTangentMean = 0,
-  kTangentRotation = 3,
-  kTangentLogScaleU = 6,
-  kTangentLogScaleV = 7,
-  kTangentOpacityLogit = 8,
-  kTangentCount = 9
-};
-
-/// The rasteriser works on blocks of this many consecutive Gaussians and reads whole blocks.
-inline constexpr std::size_t kBlockSize = 16;
 
 /// Equally long columns, each followed by kBlockSize readable values.
 template <class S, int kColumns>

@@ -5,55 +5,16 @@
 #include "tests/splat/scenes.hpp"
 #include <gtest/gtest.h>
 
+#include "covsplat/splat/cuda/device_info.hpp"
+
 namespace covsplat {
 namespace {
-
-SensorModel Sensor() { return UniformSensorModel(32, 256, -0.4, 0.4, 0.5, 30.0); }
-
-/// A room of 10 x 8 m seen from its middle.
-RangeMeasurement RoomMeasurement(const SensorModel& sensor) {
-  RangeMeasurement m{
-      Image<float>(sensor.Rows(), sensor.Columns(), 0.0f),
-      Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::Zero())};
-  for (int row = 0; row < sensor.Rows(); ++row) {
-    for (int column = 0; column < sensor.Columns(); ++column) {
-      const Eigen::Vector3f ray = sensor.RayOf(row, column);
-      const float tx = 5.0f / std::max(std::abs(ray.x()), 1e-6f);
-      const float ty = 4.0f / std::max(std::abs(ray.y()), 1e-6f);
-      m.range_m(row, column) = std::min(tx, ty);
-      m.normal(row, column) = tx < ty ? Eigen::Vector3f(ray.x() < 0 ? 1.0f : -1.0f, 0.0f, 0.0f)
-                                      : Eigen::Vector3f(0.0f, ray.y() < 0 ? 1.0f : -1.0f, 0.0f);
-    }
-  }
-  return m;
-}
-
-/// Surfels on the room's walls, displaced and tilted by noise.
-GaussianColumns<float> NoisyRoom(const SensorModel& sensor, const RangeMeasurement& m) {
-  GaussianColumns<float> table;
-  table.Resize(static_cast<std::size_t>(sensor.Rows() * sensor.Columns() / 4));
-  Rng rng(3);
-  std::size_t i = 0;
-  for (int row = 0; row < sensor.Rows(); row += 2) {
-    for (int column = 0; column < sensor.Columns(); column += 2) {
-      const Eigen::Vector3d tilt(rng.Normal(), rng.Normal(), rng.Normal());
-      const Eigen::Vector3d normal =
-          (m.normal(row, column).cast<double>() + 0.15 * tilt).normalized();
-      const double range = m.range_m(row, column) + 0.05 * rng.Normal();
-      const Eigen::Vector3d mean = range * sensor.RayOf(row, column).cast<double>();
-      const Eigen::Quaterniond q =
-          Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), normal);
-      SetGaussian(table, i++, mean, q, 0.1, 0.1, 0.5);
-    }
-  }
-  return table;
-}
 
 std::unique_ptr<SplatEngine> MakeEngine(ThreadPool& pool) {
   EngineConfig config;  // far from the truth: larger steps than a map needs that starts on surfaces
   config.optimizer.mean_step_m = 1e-3;
   config.optimizer.rotation_step_rad = 5e-3;
-  return std::move(MakeSplatEngine(Backend::kCpu, Sensor(), config, pool).value());
+  return std::move(MakeSplatEngine(Backend::kCpu, RoomSensor(), config, pool).value());
 }
 
 double MeanRangeError(const RenderOutput& render, const RangeMeasurement& m) {
@@ -67,10 +28,10 @@ double MeanRangeError(const RenderOutput& render, const RangeMeasurement& m) {
 TEST(SplatEngine, OptimisingExplainsTheMeasurement) {
   ThreadPool pool(2);
   const auto engine = MakeEngine(pool);
-  const RangeMeasurement m = RoomMeasurement(Sensor());
+  const RangeMeasurement m = RoomMeasurement(RoomSensor());
   const SE3 pose = SE3::Exp((Vector6d() << 0.1, 0.2, -0.4, 10.0, -5.0, 2.0).finished());
   const int anchor = engine->AddAnchor(pose);
-  engine->Append(anchor, NoisyRoom(Sensor(), m));
+  engine->Append(anchor, NoisyRoom(RoomSensor(), m));
   engine->SetView(anchor, m);
   const double before = MeanRangeError(engine->Render(pose), m);
   StepReport first;
@@ -85,12 +46,12 @@ TEST(SplatEngine, OptimisingExplainsTheMeasurement) {
 }
 
 TEST(SplatEngine, SameBitsForAnyNumberOfThreads) {
-  const RangeMeasurement m = RoomMeasurement(Sensor());
+  const RangeMeasurement m = RoomMeasurement(RoomSensor());
   const auto optimise = [&](int threads) {
     ThreadPool pool(threads);
     const auto engine = MakeEngine(pool);
     engine->AddAnchor(SE3());
-    engine->Append(0, NoisyRoom(Sensor(), m));
+    engine->Append(0, NoisyRoom(RoomSensor(), m));
     engine->SetView(0, m);
     for (int i = 0; i < 25; ++i) engine->Step(0, true);
     return engine->Gaussians();
@@ -107,9 +68,9 @@ TEST(SplatEngine, SameBitsForAnyNumberOfThreads) {
 TEST(SplatEngine, AMovedAnchorTakesItsGaussiansAlong) {
   ThreadPool pool(1);
   const auto engine = MakeEngine(pool);
-  const RangeMeasurement m = RoomMeasurement(Sensor());
+  const RangeMeasurement m = RoomMeasurement(RoomSensor());
   engine->AddAnchor(SE3());
-  engine->Append(0, NoisyRoom(Sensor(), m));
+  engine->Append(0, NoisyRoom(RoomSensor(), m));
   const RenderOutput before = engine->Render(SE3());
   const SE3 moved = SE3::Exp((Vector6d() << 0.3, -0.2, 1.0, 100.0, 50.0, -3.0).finished());
   engine->SetAnchorPose(0, moved);
@@ -144,10 +105,19 @@ TEST(SplatEngine, KeepRemovesTheOthersAndNothingElse) {
 }
 
 TEST(SplatEngine, CudaIsAClearErrorWithoutIt) {
+  if (cuda::FindDevice()) GTEST_SKIP() << "there is a CUDA device";
   ThreadPool pool(1);
-  const auto engine = MakeSplatEngine(Backend::kCuda, Sensor(), {}, pool);
+  const auto engine = MakeSplatEngine(Backend::kCuda, RoomSensor(), {}, pool);
   ASSERT_FALSE(engine.has_value());
   EXPECT_EQ(engine.error().code, ErrorCode::kUnavailable);
+}
+
+TEST(SplatEngine, AutoTakesTheCpuWithoutCuda) {
+  if (cuda::FindDevice()) GTEST_SKIP() << "there is a CUDA device";
+  ThreadPool pool(1);
+  const auto engine = MakeSplatEngine(Backend::kAuto, RoomSensor(), {}, pool);
+  ASSERT_TRUE(engine.has_value());
+  EXPECT_EQ((*engine)->Device().substr(0, 3), "cpu");
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Small scenes of Gaussians for the rasteriser's tests.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -8,7 +9,7 @@
 
 #include "covsplat/core/rng.hpp"
 #include "covsplat/core/sensor_model.hpp"
-#include "covsplat/splat/gaussians.hpp"
+#include "covsplat/splat/engine.hpp"
 
 namespace covsplat {
 
@@ -83,6 +84,47 @@ GaussianColumns<To> Convert(const GaussianColumns<From>& from) {
     }
   }
   return to;
+}
+
+inline SensorModel RoomSensor() { return UniformSensorModel(32, 256, -0.4, 0.4, 0.5, 30.0); }
+
+/// A room of 10 x 8 m seen from its middle.
+inline RangeMeasurement RoomMeasurement(const SensorModel& sensor) {
+  RangeMeasurement m{
+      Image<float>(sensor.Rows(), sensor.Columns(), 0.0f),
+      Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::Zero())};
+  for (int row = 0; row < sensor.Rows(); ++row) {
+    for (int column = 0; column < sensor.Columns(); ++column) {
+      const Eigen::Vector3f ray = sensor.RayOf(row, column);
+      const float tx = 5.0f / std::max(std::abs(ray.x()), 1e-6f);
+      const float ty = 4.0f / std::max(std::abs(ray.y()), 1e-6f);
+      m.range_m(row, column) = std::min(tx, ty);
+      m.normal(row, column) = tx < ty ? Eigen::Vector3f(ray.x() < 0 ? 1.0f : -1.0f, 0.0f, 0.0f)
+                                      : Eigen::Vector3f(0.0f, ray.y() < 0 ? 1.0f : -1.0f, 0.0f);
+    }
+  }
+  return m;
+}
+
+/// Surfels on the room's walls, displaced and tilted by noise.
+inline GaussianColumns<float> NoisyRoom(const SensorModel& sensor, const RangeMeasurement& m) {
+  GaussianColumns<float> table;
+  table.Resize(static_cast<std::size_t>(sensor.Rows() * sensor.Columns() / 4));
+  Rng rng(3);
+  std::size_t i = 0;
+  for (int row = 0; row < sensor.Rows(); row += 2) {
+    for (int column = 0; column < sensor.Columns(); column += 2) {
+      const Eigen::Vector3d tilt(rng.Normal(), rng.Normal(), rng.Normal());
+      const Eigen::Vector3d normal =
+          (m.normal(row, column).cast<double>() + 0.15 * tilt).normalized();
+      const double range = m.range_m(row, column) + 0.05 * rng.Normal();
+      const Eigen::Vector3d mean = range * sensor.RayOf(row, column).cast<double>();
+      const Eigen::Quaterniond q =
+          Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), normal);
+      SetGaussian(table, i++, mean, q, 0.1, 0.1, 0.5);
+    }
+  }
+  return table;
 }
 
 }  // namespace covsplat

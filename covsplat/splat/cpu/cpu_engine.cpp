@@ -1,24 +1,14 @@
 #include "covsplat/splat/cpu/cpu_engine.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "covsplat/core/check.hpp"
+#include "covsplat/splat/gaussian_rows.hpp"
 #include "covsplat/splat/surface_normals.hpp"
 
 namespace covsplat {
 namespace {
-
-constexpr float kInvisibleLogit = -30.0f;
-
-std::size_t RoundUpToBlock(std::size_t n) { return (n + kBlockSize - 1) / kBlockSize * kBlockSize; }
-
-/// Harmless values for padding rows and for rows that are about to be written.
-void MakeInert(GaussianColumns<float>& table, std::size_t begin, std::size_t end) {
-  for (int p = 0; p < kParameterCount; ++p) {
-    const float value = p == kQuatW ? 1.0f : p == kOpacityLogit ? kInvisibleLogit : 0.0f;
-    std::fill(table.Column(p) + begin, table.Column(p) + end, value);
-  }
-}
 
 void ResetMoments(MomentColumns<float>& moments, std::size_t begin, std::size_t end) {
   for (int c = 0; c < kMomentCount; ++c) {
@@ -29,8 +19,15 @@ void ResetMoments(MomentColumns<float>& moments, std::size_t begin, std::size_t 
 
 }  // namespace
 
-CpuEngine::CpuEngine(const SensorModel& sensor, const EngineConfig& config, ThreadPool& pool)
-    : sensor_(sensor), config_(config), pool_(pool), rasterizer_(sensor, config.raster, pool) {}
+CpuEngine::CpuEngine(const SensorModel& sensor,
+                     const EngineConfig& config,
+                     std::string device,
+                     ThreadPool& pool)
+    : sensor_(sensor),
+      config_(config),
+      device_(std::move(device)),
+      pool_(pool),
+      rasterizer_(sensor, config.raster, pool) {}
 
 int CpuEngine::AddAnchor(const SE3& T_map_anchor) {
   T_map_anchor_.push_back(T_map_anchor);
@@ -65,26 +62,15 @@ AnchorRange CpuEngine::Append(int anchor, const GaussianColumns<float>& fresh) {
 
 std::vector<std::size_t> CpuEngine::Keep(std::span<const std::uint8_t> keep) {
   COVSPLAT_CHECK(keep.size() == gaussians_.Size());
-  std::vector<std::size_t> old_row;
-  std::vector<AnchorRange> kept_ranges;
+  KeptRows kept = KeepRows(ranges_, keep);
+  MoveRows(kept, gaussians_);
+  MoveRows(kept, moments_);
+  ranges_ = std::move(kept.ranges);
   for (const AnchorRange& range : ranges_) {
-    AnchorRange kept{range.anchor, old_row.size(), 0};
-    for (std::size_t i = range.begin; i < range.end; ++i) {
-      if (keep[i] == 0) continue;
-      gaussians_.MoveRow(i, old_row.size());
-      moments_.MoveRow(i, old_row.size());
-      old_row.push_back(i);
-    }
-    kept.end = old_row.size();
-    if (kept.end == kept.begin) continue;
-    kept_ranges.push_back(kept);
-    const std::size_t padded = RoundUpToBlock(kept.end);
-    MakeInert(gaussians_, kept.end, padded);
-    old_row.resize(padded, range.begin);
+    MakeInert(gaussians_, range.end, RoundUpToBlock(range.end));
   }
-  ranges_ = std::move(kept_ranges);
-  ResizeTables(old_row.size());
-  return old_row;
+  ResizeTables(kept.old_row.size());
+  return std::move(kept.old_row);
 }
 
 void CpuEngine::SetView(int anchor, const RangeMeasurement& measurement) {

@@ -1,7 +1,9 @@
 // CpuEngine: the default backend, on any CPU.
 #pragma once
 
-#include "covsplat/splat/cpu/compact_view.hpp"
+#include <string>
+
+#include "covsplat/splat/compact_view.hpp"
 #include "covsplat/splat/cpu/rasterizer.hpp"
 #include "covsplat/splat/engine.hpp"
 
@@ -9,8 +11,13 @@ namespace covsplat {
 
 class CpuEngine final : public SplatEngine {
  public:
-  CpuEngine(const SensorModel& sensor, const EngineConfig& config, ThreadPool& pool);
+  /// `device`: what Device() says.
+  CpuEngine(const SensorModel& sensor,
+            const EngineConfig& config,
+            std::string device,
+            ThreadPool& pool);
 
+  std::string Device() const override { return device_; }
   int AddAnchor(const SE3& T_map_anchor) override;
   void SetAnchorPose(int anchor, const SE3& T_map_anchor) override;
   const std::vector<SE3>& AnchorPoses() const override { return T_map_anchor_; }
@@ -29,6 +36,7 @@ class CpuEngine final : public SplatEngine {
 
   const SensorModel sensor_;
   const EngineConfig config_;
+  const std::string device_;
   ThreadPool& pool_;
   Rasterizer<float> rasterizer_;
 

@@ -5,20 +5,6 @@
 
 namespace covsplat {
 
-/// Adam's memory: first moments of the tangent, one second moment per vector, and the powers of
-/// beta1 and beta2 that undo the start from zero (each Gaussian counts its own steps).
-enum MomentColumn : int {
-  kFirstMoment = 0,
-  kSecondMean = kTangentCount,
-  kSecondRotation,
-  kSecondLogScaleU,
-  kSecondLogScaleV,
-  kSecondOpacity,
-  kBeta1Power,
-  kBeta2Power,
-  kMomentCount
-};
-
 template <class S>
 using MomentColumns = ColumnTable<S, kMomentCount>;
 

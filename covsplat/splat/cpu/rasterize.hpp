@@ -24,20 +24,6 @@ struct TileJob {
   std::uint8_t* slot_used = nullptr;           ///< [pairs], set to 1 where a slot was written
 };
 
-/// What the 16 sums in a gradient slot are; all are linear in the ray, so that pixels just add up.
-enum GradientSum : int {
-  kSumU = 0,        ///< 3: with respect to u
-  kSumV = 3,        ///< 3: with respect to v
-  kSumNormal = 6,   ///< 3: with respect to n
-  kSumPlane = 9,    ///< <n, c>
-  kSumUC = 10,      ///< <u, c>
-  kSumVC = 11,      ///< <v, c>
-  kSumAlpha = 12,   ///< alpha * d/d alpha
-  kSumColumn = 13,  ///< of the centre
-  kSumRow = 14,     ///< of the centre
-  kSumRange = 15    ///< of the centre
-};
-
 /// Renders tiles [begin, end) into `images`.
 template <class S>
 void RenderTiles(const TileJob<S>& job, std::size_t begin, std::size_t end);

@@ -1,26 +1,15 @@
 #include "covsplat/splat/cpu/rasterizer.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include "covsplat/core/check.hpp"
+#include "covsplat/splat/gaussian_rows.hpp"
 
 namespace covsplat {
 namespace {
 
 constexpr std::size_t kBlocksPerTask = 128;
 constexpr std::size_t kTilesPerTask = 64;
-
-template <class S>
-AnchorTransform<S> ToTransform(const SE3& T_sensor_anchor) {
-  AnchorTransform<S> transform;
-  const Eigen::Matrix3d rotation = T_sensor_anchor.RotationMatrix();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) transform.rotation[3 * i + j] = static_cast<S>(rotation(i, j));
-    transform.translation[i] = static_cast<S>(T_sensor_anchor.Translation()[i]);
-  }
-  return transform;
-}
 
 }  // namespace
 
@@ -35,7 +24,9 @@ void Rasterizer<S>::LookFrom(const SE3& T_map_sensor,
                              const GaussianColumns<S>& gaussians,
                              std::span<const AnchorRange> ranges,
                              std::span<const SE3> T_map_anchor) {
-  ChooseBlocks(T_map_sensor, gaussians, ranges, T_map_anchor);
+  for (const AnchorRange& range : ranges) COVSPLAT_CHECK(range.end <= gaussians.Size());
+  ChooseBlocks<S>(
+      T_map_sensor, static_cast<double>(view_.far_m), ranges, T_map_anchor, blocks_, transforms_);
   records_.resize(kBlockSize * blocks_.size());
   boxes_.resize(kBlockSize * blocks_.size());
   active_.resize(blocks_.size());
@@ -50,31 +41,6 @@ void Rasterizer<S>::LookFrom(const SE3& T_map_sensor,
   slots_.resize(16 * Pairs());
   slot_used_.assign(Pairs(), 0);
   bins_are_fresh_ = true;
-}
-
-// Anchors out of reach of the sensor cannot have visible Gaussians: a Gaussian is at most the
-// sensor's range from its anchor, and the far limit holds at the view.
-template <class S>
-void Rasterizer<S>::ChooseBlocks(const SE3& T_map_sensor,
-                                 const GaussianColumns<S>& gaussians,
-                                 std::span<const AnchorRange> ranges,
-                                 std::span<const SE3> T_map_anchor) {
-  blocks_.clear();
-  transforms_.clear();
-  const SE3 T_sensor_map = T_map_sensor.Inverse();
-  for (const AnchorRange& range : ranges) {
-    const SE3 T_sensor_anchor = T_sensor_map * T_map_anchor[static_cast<std::size_t>(range.anchor)];
-    if (T_sensor_anchor.Translation().norm() > 2.0 * static_cast<double>(view_.far_m)) continue;
-    const auto transform = static_cast<std::uint16_t>(transforms_.size());
-    transforms_.push_back(ToTransform<S>(T_sensor_anchor));
-    COVSPLAT_CHECK(range.end <= gaussians.Size() && range.begin % kBlockSize == 0);
-    COVSPLAT_CHECK(transforms_.size() < 65536);
-    for (std::size_t begin = range.begin; begin < range.end; begin += kBlockSize) {
-      const std::size_t count = std::min(kBlockSize, range.end - begin);
-      blocks_.push_back(
-          {static_cast<std::uint32_t>(begin), static_cast<std::uint16_t>(count), transform});
-    }
-  }
 }
 
 template <class S>

@@ -50,10 +50,6 @@ class Rasterizer {
   std::size_t ActiveBlocks() const { return active_.size(); }
 
  private:
-  void ChooseBlocks(const SE3& T_map_sensor,
-                    const GaussianColumns<S>& gaussians,
-                    std::span<const AnchorRange> ranges,
-                    std::span<const SE3> T_map_anchor);
   void Project(const GaussianColumns<S>& gaussians, bool with_boxes);
   TileJob<S> MakeTileJob();
   LossSums RunStep(const TileJob<S>& job);

@@ -1,0 +1,262 @@
+// From gradient slots to parameters. Half a warp adds up the slots of a Gaussian, one sum per lane;
+// then one thread takes it through the chain rule and a step of Adam. The formulas are those of
+// cpu/optimize.cpp.
+#include <math_constants.h>
+
+#include "covsplat/splat/cuda/device_math.cuh"
+#include "covsplat/splat/cuda/kernels.hpp"
+
+namespace covsplat::cuda {
+namespace {
+
+constexpr int kHalf = static_cast<int>(kTilePixels);
+constexpr int kThreads = 256;
+constexpr int kRecords = 64;  // per block
+constexpr int kHalves = kThreads / kHalf;
+
+/// The sums of a block's records. Rows are one longer than needed, to spread them over the banks.
+struct SlotSums {
+  float sum[kRecords][kHalf + 1];
+  bool seen[kRecords];
+};
+
+/// One sum per lane over the used slots of a record, in their order.
+__device__ float SumSlots(const OptimizeJob& job, std::uint32_t record, int lane, bool& seen) {
+  const std::uint32_t end = job.scene.slot_begin[record + 1];
+  const unsigned shift = threadIdx.x % kWarpSize / kHalf * kHalf;
+  const unsigned own_half = 0xffffu << shift;
+  float sum = 0.0f;
+  seen = false;
+  for (std::uint32_t first = job.scene.slot_begin[record]; first < end; first += kHalf) {
+    const std::uint32_t own = first + static_cast<std::uint32_t>(lane);
+    const bool used = own < end && job.slot_used[own] != 0;
+    if (used) job.slot_used[own] = 0;
+    unsigned votes = (__ballot_sync(own_half, used) & own_half) >> shift;
+    seen = seen || votes != 0;
+    for (; votes != 0; votes &= votes - 1) {
+      const std::size_t slot = first + static_cast<std::uint32_t>(__ffs(votes) - 1);
+      sum += job.slots[kHalf * slot + static_cast<std::size_t>(lane)];
+    }
+  }
+  return sum;
+}
+
+__device__ void SumAllSlots(const OptimizeJob& job, std::uint32_t first, SlotSums& out) {
+  const int lane = static_cast<int>(threadIdx.x) % kHalf;
+  for (int i = static_cast<int>(threadIdx.x) / kHalf; i < kRecords; i += kHalves) {
+    bool seen = false;
+    const std::uint32_t record = first + static_cast<std::uint32_t>(i);
+    if (record < job.scene.records) out.sum[i][lane] = SumSlots(job, record, lane, seen);
+    if (lane == 0) out.seen[i] = seen;
+  }
+  __syncthreads();
+}
+
+/// Gradient of a Gaussian with respect to its tangent.
+struct TangentGradient {
+  float3 mean;      ///< in the anchor's frame
+  float3 rotation;  ///< in the Gaussian's own frame
+  float log_scale_u, log_scale_v, opacity_logit;
+  float3 normal;  ///< of the Gaussian in the anchor's frame
+};
+
+/// Gradient with respect to the centre through its image coordinates and its range: the
+/// screen-space filter's share.
+__device__ float3
+FilterGradient(const DeviceView& view, float3 centre, float g_column, float g_row, float g_range) {
+  const float horizontal2 = centre.x * centre.x + centre.y * centre.y;
+  const float horizontal = sqrtf(fmaxf(horizontal2, 1e-20f));
+  const float range2 = centre.z * centre.z + horizontal2;
+  const float position =
+      (atan2f(centre.z, horizontal) - view.row_table_origin_rad) * view.row_table_samples_per_rad;
+  const float last = static_cast<float>(view.row_table_size - 1) * 0.9999999f;
+  const int index = static_cast<int>(fmaxf(fminf(position, last), 0.0f));
+  const float slope = view.row_table[index + 1] - view.row_table[index];
+  const float g_elevation = g_row * slope * view.row_table_samples_per_rad;
+  const float g_azimuth = g_column * (static_cast<float>(-view.columns) / (2.0f * CUDART_PI_F));
+  const float around = g_azimuth / fmaxf(horizontal2, 1e-20f);
+  const float radial = g_range / sqrtf(range2);
+  const float up = g_elevation / (range2 * horizontal);
+  return {radial * centre.x - around * centre.y - up * centre.x * centre.z,
+          radial * centre.y + around * centre.x - up * centre.y * centre.z,
+          radial * centre.z + up * horizontal2};
+}
+
+/// The chain rule from a record to the Gaussian's tangent.
+__device__ TangentGradient GradientOf(const DeviceView& view,
+                                      const SurfelRecord<float>& s,
+                                      const float* rotation,
+                                      const float* sums) {
+  const float3 u = Vector(s.u);
+  const float3 v = Vector(s.v);
+  const float3 n = Vector(s.n);
+  const float inverse_u2 = 1.0f / fmaxf(Dot(u, u), 1e-20f);
+  const float inverse_v2 = 1.0f / fmaxf(Dot(v, v), 1e-20f);
+  // The centre from its coordinates along the orthogonal axes: u = r_u / s_u.
+  const float3 centre = (s.u_c * inverse_u2) * u + (s.v_c * inverse_v2) * v + s.plane * n;
+  const float3 g_u = sums[kSumUC] * centre + Vector(sums + kSumU);
+  const float3 g_v = sums[kSumVC] * centre + Vector(sums + kSumV);
+  const float3 g_n = sums[kSumPlane] * centre + Vector(sums + kSumNormal);
+  const float3 g_centre =
+      sums[kSumUC] * u + sums[kSumVC] * v + sums[kSumPlane] * n +
+      FilterGradient(view, centre, sums[kSumColumn], sums[kSumRow], sums[kSumRange]);
+  const float3 torque = Cross(u, g_u) + Cross(v, g_v) + Cross(n, g_n);
+  const float3 r_u = sqrtf(inverse_u2) * u;
+  const float3 r_v = sqrtf(inverse_v2) * v;
+  return {RotateBack(rotation, g_centre),
+          {Dot(r_u, torque), Dot(r_v, torque), Dot(Cross(r_u, r_v), torque)},
+          -Dot(u, g_u),
+          -Dot(v, g_v),
+          sums[kSumAlpha] * (1.0f - s.opacity),
+          RotateBack(rotation, n)};
+}
+
+/// Adam's state of a Gaussian while it takes a step.
+class AdamStep {
+ public:
+  __device__ AdamStep(const OptimizeJob& job, std::size_t row)
+      : job_(job),
+        row_(row),
+        correction1_(Correction(kBeta1Power, job.rates.beta1)),
+        correction2_(Correction(kBeta2Power, job.rates.beta2)) {}
+
+  __device__ float First(int tangent, float gradient) const {
+    return correction1_ * Blend(kFirstMoment + tangent, job_.rates.beta1, gradient);
+  }
+  __device__ float3 First(int tangent, float3 g) const {
+    return {First(tangent, g.x), First(tangent + 1, g.y), First(tangent + 2, g.z)};
+  }
+
+  /// 1 / (root of the corrected second moment + epsilon).
+  __device__ float InverseRoot(int column, float squared_gradient) const {
+    const float moment = Blend(column, job_.rates.beta2, squared_gradient);
+    return 1.0f / (sqrtf(moment * correction2_) + job_.rates.epsilon);
+  }
+
+ private:
+  __device__ float Correction(int column, float beta) const {
+    float& power = At(job_.moments, column, row_);
+    power *= beta;
+    return 1.0f / fmaxf(1.0f - power, 1e-6f);
+  }
+  __device__ float Blend(int column, float beta, float fresh) const {
+    float& moment = At(job_.moments, column, row_);
+    moment = beta * (moment - fresh) + fresh;
+    return moment;
+  }
+
+  const OptimizeJob& job_;
+  const std::size_t row_;
+  const float correction1_, correction2_;
+};
+
+__device__ void StepMean(const OptimizeJob& job,
+                         const AdamStep& adam,
+                         std::size_t row,
+                         const TangentGradient& g) {
+  float3 gradient = g.mean;
+  if (job.rates.mean_along_normal) gradient = Dot(g.normal, g.mean) * g.normal;
+  const float3 first = adam.First(kTangentMean, gradient);
+  const float scale =
+      job.rates.mean_step_m * adam.InverseRoot(kSecondMean, Dot(gradient, gradient));
+  At(job.scene.gaussians, kMeanX, row) -= scale * first.x;
+  At(job.scene.gaussians, kMeanY, row) -= scale * first.y;
+  At(job.scene.gaussians, kMeanZ, row) -= scale * first.z;
+}
+
+/// q <- q * exp(-delta), to second order and renormalised.
+__device__ void StepRotation(const OptimizeJob& job,
+                             const AdamStep& adam,
+                             std::size_t row,
+                             const TangentGradient& g) {
+  const float3 first = adam.First(kTangentRotation, g.rotation);
+  const float scale = -0.5f * job.rates.rotation_step_rad *
+                      adam.InverseRoot(kSecondRotation, Dot(g.rotation, g.rotation));
+  const float3 d = scale * first;
+  float& w = At(job.scene.gaussians, kQuatW, row);
+  float& x = At(job.scene.gaussians, kQuatX, row);
+  float& y = At(job.scene.gaussians, kQuatY, row);
+  float& z = At(job.scene.gaussians, kQuatZ, row);
+  const float3 q{x, y, z};
+  const float new_w = w - Dot(q, d);
+  const float3 new_q = w * d + q + Cross(q, d);
+  const float inverse = 1.0f / sqrtf(fmaxf(new_w * new_w + Dot(new_q, new_q), 1e-20f));
+  w = new_w * inverse;
+  x = new_q.x * inverse;
+  y = new_q.y * inverse;
+  z = new_q.z * inverse;
+}
+
+__device__ void StepScalar(
+    float& parameter, const AdamStep& adam, int tangent, int second, float rate, float gradient) {
+  const float first = adam.First(tangent, gradient);
+  parameter -= rate * first * adam.InverseRoot(second, gradient * gradient);
+}
+
+/// Gradient of the scale term (paper eq. 13) on the larger of the two log scales.
+__device__ void AddScaleTerm(const AdamRates& rates,
+                             float log_scale_u,
+                             float log_scale_v,
+                             TangentGradient& g) {
+  const float scale_u = expf(log_scale_u);
+  const float scale_v = expf(log_scale_v);
+  if (scale_u >= scale_v && scale_u > rates.max_scale_m) {
+    g.log_scale_u += rates.scale_weight * scale_u;
+  }
+  if (scale_v > scale_u && scale_v > rates.max_scale_m) {
+    g.log_scale_v += rates.scale_weight * scale_v;
+  }
+}
+
+__global__ void __launch_bounds__(kThreads) OptimizeKernel(OptimizeJob job) {
+  __shared__ SlotSums sums;
+  const std::uint32_t first = blockIdx.x * kRecords;
+  const std::uint32_t last = min(first + kRecords, job.scene.records);
+  if (job.scene.slot_begin[first] == job.scene.slot_begin[last]) return;
+  SumAllSlots(job, first, sums);
+  const std::uint32_t record = first + threadIdx.x;
+  if (threadIdx.x >= kRecords || record >= last || !sums.seen[threadIdx.x]) return;
+
+  const SceneJob& scene = job.scene;
+  const GaussianBlock block = scene.blocks[record / kBlockSize];
+  const std::size_t row = block.begin + record % kBlockSize;
+  TangentGradient gradient = GradientOf(scene.view,
+                                        scene.record[record],
+                                        scene.transforms[block.transform].rotation,
+                                        sums.sum[threadIdx.x]);
+  float& log_scale_u = At(scene.gaussians, kLogScaleU, row);
+  float& log_scale_v = At(scene.gaussians, kLogScaleV, row);
+  AddScaleTerm(job.rates, log_scale_u, log_scale_v, gradient);
+  const AdamStep adam(job, row);
+  const AdamRates& rates = job.rates;
+  StepMean(job, adam, row, gradient);
+  StepRotation(job, adam, row, gradient);
+  StepScalar(log_scale_u,
+             adam,
+             kTangentLogScaleU,
+             kSecondLogScaleU,
+             rates.log_scale_step,
+             gradient.log_scale_u);
+  StepScalar(log_scale_v,
+             adam,
+             kTangentLogScaleV,
+             kSecondLogScaleV,
+             rates.log_scale_step,
+             gradient.log_scale_v);
+  StepScalar(At(scene.gaussians, kOpacityLogit, row),
+             adam,
+             kTangentOpacityLogit,
+             kSecondOpacity,
+             rates.opacity_logit_step,
+             gradient.opacity_logit);
+}
+
+}  // namespace
+
+void Optimize(const OptimizeJob& job, cudaStream_t stream) {
+  if (job.scene.records == 0) return;
+  OptimizeKernel<<<CeilDivide(job.scene.records, kRecords), kThreads, 0, stream>>>(job);
+  CheckLaunch("optimising");
+}
+
+}  // namespace covsplat::cuda

@@ -1,0 +1,425 @@
+// Tiles: half a warp blends one tile of 4 x 4 pixels, one pixel per lane, evaluates the loss, and
+// walks back to front for the gradient. The two halves of a warp take the same turns, so that votes
+// and sums stay within the warp. The formulas are those of cpu/rasterize.cpp.
+#include "covsplat/splat/cuda/device_math.cuh"
+#include "covsplat/splat/cuda/kernels.hpp"
+
+namespace covsplat::cuda {
+namespace {
+
+constexpr int kHalf = static_cast<int>(kTilePixels);
+constexpr int kWarps = 2;  // per block
+constexpr int kThreads = kWarps * kWarpSize;
+constexpr int kTilesPerBlock = 2 * kWarps;
+constexpr int kBlocksPerProcessor = 10;  // leaves the gradient registers enough not to spill
+constexpr int kBatch = kHalf;            // records that half a warp reads at once
+constexpr std::size_t kRecordParts = sizeof(SurfelRecord<float>) / sizeof(float4);
+
+/// The next records of a tile's list. `spread` puts the halves of a warp on different banks.
+struct Batch {
+  SurfelRecord<float> record[kBatch];
+  TilePair pair[kBatch];
+  float4 spread[4];
+};
+static_assert(sizeof(Batch) % 128 == 64);
+
+/// A lane's place: its tile, its pixel and the ray through it.
+struct Place {
+  int half, lane;  ///< of the warp; of the half
+  int tile;
+  float3 ray;
+  float column, row;  ///< of the pixel's centre, px
+  float columns;      ///< of the whole image, for the wrap
+};
+
+__device__ Place FindPlace(const DeviceView& view) {
+  Place p;
+  p.half = static_cast<int>(threadIdx.x / kHalf) % 2;
+  p.lane = static_cast<int>(threadIdx.x) % kHalf;
+  p.tile = static_cast<int>(blockIdx.x) * kTilesPerBlock + static_cast<int>(threadIdx.x) / kHalf;
+  const int x = p.tile % view.tile_columns;
+  const int y = min(p.tile / view.tile_columns, view.tile_rows - 1);
+  const float cos_el = view.cos_elevation[kHalf * y + p.lane];
+  p.ray = {cos_el * view.cos_azimuth[kHalf * x + p.lane],
+           cos_el * view.sin_azimuth[kHalf * x + p.lane],
+           view.sin_elevation[kHalf * y + p.lane]};
+  p.column = static_cast<float>(kTileSide * x + p.lane % kTileSide) + 0.5f;
+  p.row = static_cast<float>(kTileSide * y + p.lane / kTileSide) + 0.5f;
+  p.columns = static_cast<float>(view.columns);
+  return p;
+}
+
+/// Of a vote of the whole warp: whether anyone in the lane's half said yes.
+__device__ bool AnyInHalf(unsigned votes, int half) {
+  return ((votes >> (kHalf * half)) & 0xffffu) != 0;
+}
+
+/// Largest value of each `lanes` neighbouring lanes.
+__device__ int MaxOver(int lanes, int value) {
+  for (int width = lanes / 2; width > 0; width /= 2) {
+    value = max(value, __shfl_xor_sync(kWholeWarp, value, width));
+  }
+  return value;
+}
+
+/// Reads entries [begin, begin + count) of a list, at most kBatch; the rest is invisible.
+__device__ void LoadBatch(
+    const RasterJob& job, std::uint32_t begin, int count, const Place& place, Batch& batch) {
+  __syncwarp();
+  TilePair pair{};
+  if (place.lane < count) pair = job.pairs[begin + static_cast<std::uint32_t>(place.lane)];
+  batch.pair[place.lane] = pair;
+  const auto* from = reinterpret_cast<const float4*>(job.record);
+  auto* to = reinterpret_cast<float4*>(batch.record);
+  constexpr int kParts = static_cast<int>(kRecordParts);
+  for (int i = 0; i < kParts; ++i) {
+    const int entry = (kHalf / kParts) * i + place.lane / kParts;
+    const std::uint32_t record = __shfl_sync(kWholeWarp, pair.record, entry, kHalf);
+    float4 part{0.0f, 0.0f, 0.0f, 0.0f};
+    if (entry < count) part = from[kRecordParts * record + place.lane % kParts];
+    to[kHalf * i + place.lane] = part;
+  }
+  __syncwarp();
+}
+
+/// Where a ray meets a Gaussian: on its surface, or within its screen-space filter.
+struct Meeting {
+  bool on_surface;
+  float t;             ///< along the ray to the Gaussian's plane
+  float u_ray, v_ray;  ///< <u, r>, <v, r>
+  float a, b;          ///< in units of the Gaussian's scales
+  float dx, dy;        ///< centre - pixel, px, the short way round the turn
+  float alpha;
+};
+
+__device__ Meeting Meet(const DeviceView& view, const Place& p, const SurfelRecord<float>& s) {
+  Meeting m;
+  const float n_ray = Dot(Vector(s.n), p.ray);
+  m.t = s.plane * FastReciprocal(n_ray);
+  m.u_ray = Dot(Vector(s.u), p.ray);
+  m.v_ray = Dot(Vector(s.v), p.ray);
+  m.a = m.t * m.u_ray - s.u_c;
+  m.b = m.t * m.v_ray - s.v_c;
+  m.dx = s.column - p.column;
+  const float half_turn = 0.5f * p.columns;
+  m.dx += m.dx > half_turn ? -p.columns : m.dx < -half_turn ? p.columns : 0.0f;
+  m.dy = s.row - p.row;
+  const float surface = m.a * m.a + m.b * m.b;
+  const float filter = view.lowpass * (m.dx * m.dx + m.dy * m.dy);
+  m.on_surface = fabsf(n_ray) > view.grazing_cosine && m.t > view.near_m && surface <= filter;
+  const float alpha = s.opacity * __expf(-0.5f * (m.on_surface ? surface : filter));
+  m.alpha = alpha > view.alpha_cap ? view.alpha_cap : alpha;  // NaN stays: it is never seen
+  return m;
+}
+
+/// What a pixel has gathered so far; entries number the tile's list.
+struct Blend {
+  float transmittance = 1.0f;
+  float range_sum = 0.0f;
+  float median = 0.0f;
+  float3 normal = {0.0f, 0.0f, 0.0f};
+  int median_entry = -1;
+  int last_entry = -1;  ///< the last one seen
+};
+
+__device__ void BlendSurfel(const Meeting& m,
+                            const SurfelRecord<float>& s,
+                            int entry,
+                            Blend& blend) {
+  const float range = m.on_surface ? m.t : s.range;
+  if (blend.transmittance > 0.5f) {
+    blend.median = range;
+    blend.median_entry = entry;
+  }
+  const float weight = m.alpha * blend.transmittance;
+  blend.range_sum += weight * range;
+  blend.normal = blend.normal + weight * Vector(s.n);
+  blend.transmittance -= weight;
+  blend.last_entry = entry;
+}
+
+/// Blends the lists of a warp's two tiles; `length`: of the lane's own, 0 to leave it out. With
+/// drop_unseen the entries that some pixel sees move together and the list ends behind them.
+__device__ Blend
+BlendTile(const RasterJob& job, const Place& place, std::uint32_t begin, int length, Batch& batch) {
+  Blend blend;
+  int kept = 0;
+  const int longest = MaxOver(kWarpSize, length);
+  for (int base = 0; base < longest; base += kBatch) {
+    LoadBatch(job, begin + static_cast<std::uint32_t>(base), length - base, place, batch);
+    for (int i = 0; i < kBatch; ++i) {
+      const SurfelRecord<float>& s = batch.record[i];
+      const Meeting m = Meet(job.view, place, s);
+      const bool seen =
+          m.alpha >= job.view.alpha_min && blend.transmittance > job.view.transmittance_min;
+      const unsigned votes = __ballot_sync(kWholeWarp, seen);
+      if (votes == 0) continue;
+      if (seen) BlendSurfel(m, s, job.drop_unseen ? kept : base + i, blend);
+      if (!job.drop_unseen || !AnyInHalf(votes, place.half)) continue;
+      if (place.lane == 0) job.pairs[begin + static_cast<std::uint32_t>(kept)] = batch.pair[i];
+      ++kept;
+    }
+    const bool goes_on = base + kBatch < length && blend.transmittance > job.view.transmittance_min;
+    if (!__any_sync(kWholeWarp, goes_on)) break;
+  }
+  if (job.drop_unseen && length > 0 && place.lane == 0) {
+    job.tile_end[place.tile] = begin + static_cast<std::uint32_t>(kept);
+  }
+  return blend;
+}
+
+/// Gradient of the loss with respect to the blended images.
+struct ImageGradient {
+  float alpha = 0.0f;
+  float range_sum = 0.0f;
+  float median = 0.0f;
+  float3 normal = {0.0f, 0.0f, 0.0f};
+};
+
+struct PixelLosses {
+  float term[kLossTermCount] = {0.0f, 0.0f, 0.0f};
+};
+
+/// 1 - <N / A, target>; adds to the gradient, returns the loss.
+__device__ float NormalLoss(
+    const Blend& blend, float inverse_alpha, float3 target, float weight, ImageGradient& g) {
+  if (!(Dot(target, target) > 0.5f)) return 0.0f;
+  const float cosine = Dot(target, blend.normal) * inverse_alpha;
+  const float g_cosine = -weight * inverse_alpha;
+  g.normal = g.normal + g_cosine * target;
+  g.alpha -= g_cosine * cosine;
+  return weight * (1.0f - cosine);
+}
+
+/// The pixel-local terms of the mapping loss (paper eqs. 10 to 12) and their gradients.
+__device__ PixelLosses PixelLoss(
+    const StepJob& job, std::size_t pixel, float measured, const Blend& blend, ImageGradient& g) {
+  PixelLosses losses;
+  if (!(measured > 0.0f)) return losses;
+  const DeviceView& view = job.raster.view;
+  const LossWeights& weights = job.weights;
+  const float alpha = 1.0f - blend.transmittance;
+  const float opaque = alpha + weights.opacity_epsilon;
+  g.alpha = -weights.per_opacity / opaque;
+  losses.term[kLossOpacity] = -weights.per_opacity * logf(fmaxf(opaque, 1e-20f));
+  if (!(alpha > view.min_alpha)) return losses;
+
+  const float inverse_alpha = 1.0f / alpha;
+  const float expected = blend.range_sum * inverse_alpha;
+  const float difference = expected + view.depth_ratio * (blend.median - expected) - measured;
+  const float g_surface = difference > 0.0f ? weights.per_range : -weights.per_range;
+  const float g_expected = (1.0f - view.depth_ratio) * g_surface;
+  g.range_sum = g_expected * inverse_alpha;
+  g.median = view.depth_ratio * g_surface;
+  g.alpha -= g_expected * expected * inverse_alpha;
+  losses.term[kLossRange] = weights.per_range * fabsf(difference);
+
+  const std::int8_t* normal = job.targets.normal + 3 * pixel;
+  const float3 target = Normalized({static_cast<float>(normal[0]),
+                                    static_cast<float>(normal[1]),
+                                    static_cast<float>(normal[2])});
+  losses.term[kLossNormal] = NormalLoss(blend, inverse_alpha, target, weights.per_normal, g);
+  if (job.targets.surface != nullptr) {
+    const std::size_t pixels = kTilePixels * static_cast<std::size_t>(view.tiles);
+    const float* surface = job.targets.surface + pixel;
+    losses.term[kLossNormal] += NormalLoss(blend,
+                                           inverse_alpha,
+                                           {surface[0], surface[pixels], surface[2 * pixels]},
+                                           weights.per_surface,
+                                           g);
+  }
+  return losses;
+}
+
+/// Sums of 16 values over half a warp; lane k gets the sum of the k-th. Each round halves the
+/// values that a lane is still in charge of.
+__device__ float SumEach(float (&value)[kHalf], int lane) {
+#pragma unroll
+  for (int width = kHalf / 2; width > 0; width /= 2) {
+    const bool upper = (lane & width) != 0;
+#pragma unroll
+    for (int i = 0; i < width; ++i) {
+      const float mine = upper ? value[i + width] : value[i];
+      const float other = upper ? value[i] : value[i + width];
+      value[i] = mine + __shfl_xor_sync(kWholeWarp, other, width);
+    }
+  }
+  return value[0];
+}
+
+/// Gradient of one pixel with respect to one record: the terms that a slot sums up.
+/// `weight` = alpha * transmittance, `g_alpha` = alpha * dL/d alpha (zero at the cap).
+__device__ void SurfelGradient(const DeviceView& view,
+                               const Place& p,
+                               const SurfelRecord<float>& s,
+                               const Meeting& m,
+                               float weight,
+                               float g_alpha,
+                               float g_range,
+                               const ImageGradient& g,
+                               float (&terms)[kHalf]) {
+  const float t = m.on_surface ? m.t : 0.0f;
+  const float g_surface = m.on_surface ? g_alpha : 0.0f;
+  const float g_filter = view.lowpass * (g_surface - g_alpha);  // minus the filter's share
+  const float g_a = -(m.a * g_surface);
+  const float g_b = -(m.b * g_surface);
+  const float g_t = (m.on_surface ? g_range : 0.0f) + g_a * m.u_ray + g_b * m.v_ray;
+  const float g_plane = g_t * t * FastReciprocal(s.plane);  // t / plane = 1 / <n, r>
+  const float3 g_u = (g_a * t) * p.ray;
+  const float3 g_v = (g_b * t) * p.ray;
+  const float3 g_n = weight * g.normal - (g_plane * t) * p.ray;
+  terms[kSumU] = g_u.x;
+  terms[kSumU + 1] = g_u.y;
+  terms[kSumU + 2] = g_u.z;
+  terms[kSumV] = g_v.x;
+  terms[kSumV + 1] = g_v.y;
+  terms[kSumV + 2] = g_v.z;
+  terms[kSumNormal] = g_n.x;
+  terms[kSumNormal + 1] = g_n.y;
+  terms[kSumNormal + 2] = g_n.z;
+  terms[kSumPlane] = g_plane;
+  terms[kSumUC] = -g_a;
+  terms[kSumVC] = -g_b;
+  terms[kSumAlpha] = g_alpha;
+  terms[kSumColumn] = g_filter * m.dx;
+  terms[kSumRow] = g_filter * m.dy;
+  terms[kSumRange] = m.on_surface ? 0.0f : g_range;
+}
+
+/// Walks the lists back to front with one running suffix sum per pixel. What a pixel saw on the way
+/// out is found again from the record and from the last entry that it saw.
+__device__ void BackTile(const StepJob& job,
+                         const Place& place,
+                         std::uint32_t begin,
+                         const Blend& blend,
+                         const ImageGradient& g,
+                         Batch& batch) {
+  const DeviceView& view = job.raster.view;
+  float transmittance = blend.transmittance;
+  float suffix = 0.0f;
+  const int length = MaxOver(kHalf, blend.last_entry + 1);
+  const int longest = MaxOver(kWarpSize, length);
+  for (int base = (longest - 1) / kBatch * kBatch; base >= 0 && longest > 0; base -= kBatch) {
+    LoadBatch(job.raster, begin + static_cast<std::uint32_t>(base), length - base, place, batch);
+    for (int i = min(kBatch, longest - base) - 1; i >= 0; --i) {
+      const SurfelRecord<float>& s = batch.record[i];
+      const Meeting m = Meet(view, place, s);
+      const int entry = base + i;
+      const bool seen = m.alpha >= view.alpha_min && entry <= blend.last_entry;
+      const unsigned votes = __ballot_sync(kWholeWarp, seen);
+      if (votes == 0) continue;
+      float terms[kHalf] = {};
+      if (seen) {
+        const float inverse = FastReciprocal(1.0f - m.alpha);
+        transmittance *= inverse;
+        const float weight = m.alpha * transmittance;
+        const float range = m.on_surface ? m.t : s.range;
+        const float gained = weight * (g.range_sum * range + g.alpha + Dot(g.normal, Vector(s.n)));
+        const float g_alpha = m.alpha < view.alpha_cap ? gained - suffix * inverse * m.alpha : 0.0f;
+        suffix += gained;
+        const float g_range =
+            weight * g.range_sum + (entry == blend.median_entry ? g.median : 0.0f);
+        SurfelGradient(view, place, s, m, weight, g_alpha, g_range, g, terms);
+      }
+      const float sum = SumEach(terms, place.lane);
+      if (!AnyInHalf(votes, place.half)) continue;
+      const std::size_t slot = batch.pair[i].slot;
+      job.slots[kTilePixels * slot + static_cast<std::size_t>(place.lane)] = sum;
+      if (place.lane == 0) job.slot_used[slot] = 1;
+    }
+  }
+}
+
+__device__ float SumOfHalf(float value) {
+  for (int width = kHalf / 2; width > 0; width /= 2) {
+    value += __shfl_xor_sync(kWholeWarp, value, width);
+  }
+  return value;
+}
+
+__global__ void __launch_bounds__(kThreads) RenderKernel(RasterJob job, RenderImages images) {
+  __shared__ Batch batches[kTilesPerBlock];
+  const Place place = FindPlace(job.view);
+  Batch& batch = batches[threadIdx.x / kHalf];
+  const bool inside = place.tile < job.view.tiles;
+  const std::uint32_t begin = inside ? job.tile_begin[place.tile] : 0;
+  const int length = inside ? static_cast<int>(job.tile_end[place.tile] - begin) : 0;
+  const Blend blend = BlendTile(job, place, begin, length, batch);
+  const int row = static_cast<int>(place.row);
+  if (!inside || row >= job.view.rows) return;
+  const std::size_t pixel =
+      static_cast<std::size_t>(row) * static_cast<std::size_t>(job.view.columns) +
+      static_cast<std::size_t>(place.column);
+  const float alpha = 1.0f - blend.transmittance;
+  const bool covered = !(alpha < job.view.min_alpha);
+  const float expected = covered ? blend.range_sum / alpha : 0.0f;
+  const float3 normal = Normalized(blend.normal);
+  images.alpha[pixel] = alpha;
+  images.range_m[pixel] =
+      covered ? expected + job.view.depth_ratio * (blend.median - expected) : 0.0f;
+  images.median_m[pixel] = covered ? blend.median : 0.0f;
+  images.normal[3 * pixel] = covered ? normal.x : 0.0f;
+  images.normal[3 * pixel + 1] = covered ? normal.y : 0.0f;
+  images.normal[3 * pixel + 2] = covered ? normal.z : 0.0f;
+}
+
+/// Tiles without any measurement are left out.
+__global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) StepKernel(StepJob job) {
+  __shared__ Batch batches[kTilesPerBlock];
+  const DeviceView& view = job.raster.view;
+  const Place place = FindPlace(view);
+  Batch& batch = batches[threadIdx.x / kHalf];
+  const bool inside = place.tile < view.tiles;
+  const std::size_t pixel =
+      kTilePixels * static_cast<std::size_t>(place.tile) + static_cast<std::size_t>(place.lane);
+  const float measured =
+      inside ? job.targets.range_step_m * static_cast<float>(job.targets.range[pixel]) : 0.0f;
+  const bool wanted = AnyInHalf(__ballot_sync(kWholeWarp, measured > 0.0f), place.half);
+  const std::uint32_t begin = wanted ? job.raster.tile_begin[place.tile] : 0;
+  const int length = wanted ? static_cast<int>(job.raster.tile_end[place.tile] - begin) : 0;
+  const Blend blend = BlendTile(job.raster, place, begin, length, batch);
+  ImageGradient gradient;
+  const PixelLosses losses = PixelLoss(job, pixel, measured, blend, gradient);
+  for (int term = 0; term < kLossTermCount; ++term) {
+    const float sum = SumOfHalf(losses.term[term]);
+    if (inside && place.lane == 0) job.tile_losses[term * view.tiles + place.tile] = sum;
+  }
+  BackTile(job, place, begin, blend, gradient, batch);
+}
+
+constexpr int kSumThreads = 1024;
+
+/// One block for each term adds the tiles' losses in an order that depends on nothing.
+__global__ void SumLossesKernel(const float* tile_losses, int tiles, double* sums) {
+  __shared__ double partial[kSumThreads];
+  const float* losses = tile_losses + static_cast<std::size_t>(blockIdx.x) * tiles;
+  double sum = 0.0;
+  for (int i = static_cast<int>(threadIdx.x); i < tiles; i += kSumThreads) sum += losses[i];
+  partial[threadIdx.x] = sum;
+  for (int width = kSumThreads / 2; width > 0; width /= 2) {
+    __syncthreads();
+    if (static_cast<int>(threadIdx.x) < width) partial[threadIdx.x] += partial[threadIdx.x + width];
+  }
+  if (threadIdx.x == 0) sums[blockIdx.x] = partial[0];
+}
+
+unsigned Blocks(const DeviceView& view) {
+  return CeilDivide(static_cast<std::size_t>(view.tiles), kTilesPerBlock);
+}
+
+}  // namespace
+
+void RenderTiles(const RasterJob& job, const RenderImages& images, cudaStream_t stream) {
+  RenderKernel<<<Blocks(job.view), kThreads, 0, stream>>>(job, images);
+  CheckLaunch("rendering");
+}
+
+void StepTiles(const StepJob& job, double* sums, cudaStream_t stream) {
+  const DeviceView& view = job.raster.view;
+  StepKernel<<<Blocks(view), kThreads, 0, stream>>>(job);
+  CheckLaunch("rendering a view");
+  SumLossesKernel<<<kLossTermCount, kSumThreads, 0, stream>>>(job.tile_losses, view.tiles, sums);
+  CheckLaunch("adding up losses");
+}
+
+}  // namespace covsplat::cuda
