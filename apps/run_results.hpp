@@ -38,7 +38,7 @@ struct RunResults {
   std::string command_line;
   std::string sensor_verdict;
   std::string schedule;
-  std::string backend;
+  std::string backend;  ///< what it ran on: SplatEngine::Device()
   int threads = 0;
   bool interrupted = false;
 

@@ -76,7 +76,7 @@ std::string NameOf(const std::filesystem::path& folder) {
   return (path.has_filename() ? path : path.parent_path()).filename().string();
 }
 
-void DescribeRun(const RunRequest& request, RunResults& results) {
+void DescribeRun(const RunRequest& request, const SlamSystem& running, RunResults& results) {
   const SystemConfig& system = request.config.slam.system;
   results.recording = request.recording;
   results.title = request.title.empty() ? NameOf(request.recording) : request.title;
@@ -85,10 +85,7 @@ void DescribeRun(const RunRequest& request, RunResults& results) {
   for (const auto& [value, name] : EnumNames<Schedule>::kNames) {
     if (value == system.schedule) results.schedule = name;
   }
-  for (const auto& [value, name] : EnumNames<Backend>::kNames) {
-    if (value == system.backend) results.backend = name;
-  }
-  if (system.backend == Backend::kAuto) results.backend = "cpu";
+  results.backend = running.GetMapper().Map().Engine().Device();
 }
 
 /// Prints the first problems and keeps all.
@@ -184,13 +181,14 @@ ExitCode RunSlam(const RunRequest& original) {
   RunRequest request = original;
   Result<Prepared> run = Prepare(request);
   if (!run) return ReportError(run.error());
-  DescribeRun(request, run->results);
+  DescribeRun(request, *run->system, run->results);
   const std::string config_yaml = DumpYaml(request.config);
   if (!request.quiet) {
-    fmt::print("recording   {}: {}\nsensor      {}\n",
+    fmt::print("recording   {}: {}\nsensor      {}\nbackend     {}\n",
                request.recording.string(),
                run->results.source,
-               run->results.sensor_verdict);
+               run->results.sensor_verdict,
+               run->results.backend);
     std::fflush(stdout);
   }
   const Result<void> saved = WriteFileAtomically(run->folder / "config.yaml", config_yaml);

@@ -197,21 +197,30 @@ SceneJob CudaEngine::Scene() {
 BinJob CudaEngine::Bins() {
   return {.boxes = boxes_.Data(),
           .tile_counts = tile_counts_.Data(),
+          .record_of_slot = record_of_slot_.Data(),
           .keys = keys_.Data(),
+          .slots = slot_numbers_.Data(),
           .sorted_keys = sorted_keys_.Data(),
-          .unsorted = unsorted_.Data(),
+          .sorted_slots = sorted_slots_.Data(),
           .pairs = pairs_.Data(),
           .tile_begin = tile_begin_.Data(),
-          .tile_end = tile_end_.Data()};
+          .tile_end = tile_end_.Data(),
+          .range_bits = RangeBits(view_.tiles)};
 }
 
 RasterJob CudaEngine::Raster() {
   return {.view = view_,
           .record = records_.Data(),
           .pairs = pairs_.Data(),
+          .kept_pairs = kept_pairs_.Data(),
           .tile_begin = tile_begin_.Data(),
           .tile_end = tile_end_.Data(),
-          .drop_unseen = std::exchange(bins_are_fresh_, false)};
+          .drop_unseen = bins_are_fresh_};
+}
+
+/// After the first pass over fresh bins: its shortened lists take the place of the sorted ones.
+void CudaEngine::KeepShortLists() {
+  if (std::exchange(bins_are_fresh_, false)) pairs_.Swap(kept_pairs_);
 }
 
 RenderImages CudaEngine::Images() {
@@ -232,6 +241,8 @@ std::uint32_t CudaEngine::FindPairs() {
   boxes_.Reserve(records);
   tile_counts_.Reserve(records + 1);
   slot_begin_.Reserve(records + 1);
+  slot_sums_.Reserve(kTilePixels * records);
+  record_seen_.Reserve(records);
   scratch_.Reserve(BinScratchBytes(static_cast<std::uint32_t>(records), 0, view_.tiles));
   ProjectAll(Scene(), Bins(), stream_);
   CountPairs(Scene(), Bins(), scratch_.Data(), scratch_.Capacity(), stream_);
@@ -253,10 +264,11 @@ void CudaEngine::LookFrom(const SE3& T_map_sensor) {
   device_blocks_.Upload(pinned_blocks_.Fill(blocks_), stream_);
   device_transforms_.Upload(pinned_transforms_.Fill(transforms_), stream_);
   pair_count_ = FindPairs();
-  keys_.Reserve(pair_count_);
-  sorted_keys_.Reserve(pair_count_);
-  unsorted_.Reserve(pair_count_);
+  for (auto* buffer : {&record_of_slot_, &keys_, &slot_numbers_, &sorted_keys_, &sorted_slots_}) {
+    buffer->Reserve(pair_count_);
+  }
   pairs_.Reserve(pair_count_);
+  kept_pairs_.Reserve(pair_count_);
   slots_.Reserve(kTilePixels * static_cast<std::size_t>(pair_count_));
   slot_used_.Reserve(pair_count_);
   scratch_.Reserve(BinScratchBytes(Scene().records, pair_count_, view_.tiles));
@@ -270,6 +282,7 @@ void CudaEngine::LookFrom(const SE3& T_map_sensor) {
 RenderOutput CudaEngine::Render(const SE3& T_map_sensor) {
   LookFrom(T_map_sensor);
   RenderTiles(Raster(), Images(), stream_);
+  KeepShortLists();
   const int rows = geometry_.rows;
   const int columns = geometry_.columns;
   RenderOutput output{Image<float>(rows, columns),
@@ -302,6 +315,7 @@ void CudaEngine::BeginView(int anchor, bool surface_normals) {
   surface_is_on_ = surface_normals && config_.loss.surface_normal > 0.0;
   if (surface_is_on_) {
     RenderTiles(Raster(), Images(), stream_);
+    KeepShortLists();
     FindSurfaceNormals(
         view_, Images().range_m, views_[index].range.Data(), surface_.Data(), stream_);
   }
@@ -326,8 +340,6 @@ AdamRates CudaEngine::Rates() const {
 StepReport CudaEngine::Step(int anchor, bool surface_normals) {
   if (current_view_ != anchor || steps_left_ == 0) {
     BeginView(anchor, surface_normals);
-  } else {
-    Refresh(Scene(), stream_);
   }
   --steps_left_;
   TrainingView& view = views_[static_cast<std::size_t>(anchor)];
@@ -341,12 +353,15 @@ StepReport CudaEngine::Step(int anchor, bool surface_normals) {
                     .slot_used = slot_used_.Data(),
                     .tile_losses = tile_losses_.Data()};
   StepTiles(job, pinned_losses_.Data(), stream_);
+  KeepShortLists();
   losses_are_known_.Record(stream_);
   Optimize({.scene = Scene(),
             .moments = moments_.Table(),
             .rates = Rates(),
             .slots = slots_.Data(),
-            .slot_used = slot_used_.Data()},
+            .slot_used = slot_used_.Data(),
+            .slot_sums = slot_sums_.Data(),
+            .record_seen = record_seen_.Data()},
            stream_);
   host_is_current_ = false;
   losses_are_known_.Wait();  // the device goes on with Adam meanwhile

@@ -49,6 +49,7 @@ class CudaEngine final : public SplatEngine {
   SceneJob Scene();
   BinJob Bins();
   RasterJob Raster();
+  void KeepShortLists();
   RenderImages Images();
 
   const EngineConfig config_;
@@ -79,11 +80,11 @@ class CudaEngine final : public SplatEngine {
   DeviceBuffer<SurfelRecord<float>> records_;
   DeviceBuffer<TileBox> boxes_;
   DeviceBuffer<std::uint32_t> tile_counts_, slot_begin_, tile_begin_, tile_end_;
-  DeviceBuffer<std::uint64_t> keys_, sorted_keys_;
-  DeviceBuffer<TilePair> unsorted_, pairs_;
+  DeviceBuffer<std::uint32_t> keys_, sorted_keys_, slot_numbers_, sorted_slots_, record_of_slot_;
+  DeviceBuffer<TilePair> pairs_, kept_pairs_;
   DeviceBuffer<char> scratch_;
-  DeviceBuffer<float> slots_;
-  DeviceBuffer<std::uint8_t> slot_used_;
+  DeviceBuffer<float> slots_, slot_sums_;
+  DeviceBuffer<std::uint8_t> slot_used_, record_seen_;
   DeviceBuffer<float> images_, surface_, tile_losses_;
   PinnedBuffer<std::uint32_t> pinned_count_;
   PinnedBuffer<double> pinned_losses_;

@@ -46,21 +46,26 @@ struct SceneJob {
 
 /// Turns boxes into the tiles' lists.
 struct BinJob {
-  TileBox* boxes;              ///< [records]
-  std::uint32_t* tile_counts;  ///< [records + 1]: pairs of each record, 0 at the end
-  std::uint64_t* keys;         ///< [pairs] tile above range, unsorted
-  std::uint64_t* sorted_keys;  ///< [pairs]
-  TilePair* unsorted;          ///< [pairs]
-  TilePair* pairs;             ///< [pairs]
-  std::uint32_t* tile_begin;   ///< [tiles]
-  std::uint32_t* tile_end;     ///< [tiles]
+  TileBox* boxes;                 ///< [records]
+  std::uint32_t* tile_counts;     ///< [records + 1]: pairs of each record, 0 at the end
+  std::uint32_t* record_of_slot;  ///< [pairs]
+  std::uint32_t* keys;            ///< [pairs], by slot: tile above range
+  std::uint32_t* slots;           ///< [pairs]
+  std::uint32_t* sorted_keys;     ///< [pairs]
+  std::uint32_t* sorted_slots;    ///< [pairs]
+  TilePair* pairs;                ///< [pairs]
+  std::uint32_t* tile_begin;      ///< [tiles]
+  std::uint32_t* tile_end;        ///< [tiles]
+  int range_bits;                 ///< of a key
 };
 
-/// Blends the tiles' lists. `drop_unseen` as in the CPU's TileJob.
+/// Blends the tiles' lists. With `drop_unseen`, as in the CPU's TileJob, lists without the pairs
+/// that no pixel sees are left in `kept_pairs`.
 struct RasterJob {
   DeviceView view;
   const SurfelRecord<float>* record;
-  TilePair* pairs;
+  const TilePair* pairs;
+  TilePair* kept_pairs;
   const std::uint32_t* tile_begin;
   std::uint32_t* tile_end;
   bool drop_unseen;
@@ -111,7 +116,9 @@ struct OptimizeJob {
   DeviceTable moments;
   AdamRates rates;
   const float* slots;
-  std::uint8_t* slot_used;  ///< cleared
+  std::uint8_t* slot_used;    ///< cleared
+  float* slot_sums;           ///< [records x 16]
+  std::uint8_t* record_seen;  ///< [records]: whether any of its slots was used
 };
 
 }  // namespace covsplat::cuda

@@ -12,9 +12,9 @@ cudaError_t CheckKernels();
 
 /// Projects all records and finds their boxes, numbers of pairs and ranges.
 void ProjectAll(const SceneJob& scene, const BinJob& bins, cudaStream_t stream);
-/// Projects again the records that have slots.
-void Refresh(const SceneJob& scene, cudaStream_t stream);
 
+/// How many bits of a pair's key are left for the range.
+int RangeBits(int tiles);
 /// Scratch memory that the two functions below need for so many records and pairs.
 std::size_t BinScratchBytes(std::uint32_t records, std::size_t pairs, int tiles);
 /// From the records' numbers of pairs to `slot_begin`, whose last entry is the number of pairs.
@@ -43,7 +43,8 @@ void FindSurfaceNormals(const DeviceView& view,
 /// [kLossTermCount] in double.
 void StepTiles(const StepJob& job, double* sums, cudaStream_t stream);
 
-/// Each Gaussian adds up its slots, applies the chain rule and takes one step of Adam.
+/// Each Gaussian that some pixel saw adds up its slots, applies the chain rule, takes one step of
+/// Adam and is projected again.
 void Optimize(const OptimizeJob& job, cudaStream_t stream);
 
 /// Row i of `to` becomes row old_row[i] of `from`.

@@ -1,55 +1,44 @@
-// From gradient slots to parameters. Half a warp adds up the slots of a Gaussian, one sum per lane;
-// then one thread takes it through the chain rule and a step of Adam. The formulas are those of
-// cpu/optimize.cpp.
-#include <math_constants.h>
-
-#include "covsplat/splat/cuda/device_math.cuh"
+// From gradient slots to parameters. Half a warp adds up the slots of a Gaussian; then one thread
+// takes it through the chain rule and a step of Adam, and projects it again. The formulas are those
+// of cpu/optimize.cpp.
 #include "covsplat/splat/cuda/kernels.hpp"
+#include "covsplat/splat/cuda/surfel.cuh"
 
 namespace covsplat::cuda {
 namespace {
 
 constexpr int kHalf = static_cast<int>(kTilePixels);
-constexpr int kThreads = 256;
-constexpr int kRecords = 64;  // per block
-constexpr int kHalves = kThreads / kHalf;
+constexpr int kThreads = 128;
+constexpr int kAtOnce = 4;  // slots that are on their way at the same time
 
-/// The sums of a block's records. Rows are one longer than needed, to spread them over the banks.
-struct SlotSums {
-  float sum[kRecords][kHalf + 1];
-  bool seen[kRecords];
-};
-
-/// One sum per lane over the used slots of a record, in their order.
-__device__ float SumSlots(const OptimizeJob& job, std::uint32_t record, int lane, bool& seen) {
-  const std::uint32_t end = job.scene.slot_begin[record + 1];
-  const unsigned shift = threadIdx.x % kWarpSize / kHalf * kHalf;
+/// Half a warp adds up the used slots of a record in their order, one sum per lane.
+__global__ void __launch_bounds__(kThreads) SumSlotsKernel(OptimizeJob job) {
+  const std::uint32_t record = (blockIdx.x * kThreads + threadIdx.x) / kHalf;
+  if (record >= job.scene.records) return;
+  const std::uint32_t lane = threadIdx.x % kHalf;
+  const unsigned shift = threadIdx.x % kWarpSize - lane;
   const unsigned own_half = 0xffffu << shift;
+  const std::uint32_t end = job.scene.slot_begin[record + 1];
   float sum = 0.0f;
-  seen = false;
+  unsigned any = 0;
   for (std::uint32_t first = job.scene.slot_begin[record]; first < end; first += kHalf) {
-    const std::uint32_t own = first + static_cast<std::uint32_t>(lane);
-    const bool used = own < end && job.slot_used[own] != 0;
-    if (used) job.slot_used[own] = 0;
-    unsigned votes = (__ballot_sync(own_half, used) & own_half) >> shift;
-    seen = seen || votes != 0;
-    for (; votes != 0; votes &= votes - 1) {
-      const std::size_t slot = first + static_cast<std::uint32_t>(__ffs(votes) - 1);
-      sum += job.slots[kHalf * slot + static_cast<std::size_t>(lane)];
+    const bool used = first + lane < end && job.slot_used[first + lane] != 0;
+    if (used) job.slot_used[first + lane] = 0;
+    const unsigned votes = (__ballot_sync(own_half, used) & own_half) >> shift;
+    any |= votes;
+    const float* slot = job.slots + kHalf * static_cast<std::size_t>(first) + lane;
+    for (int i = 0; votes >> i != 0; i += kAtOnce) {
+      float value[kAtOnce];
+#pragma unroll
+      for (int k = 0; k < kAtOnce; ++k) {
+        value[k] = (votes >> (i + k)) & 1u ? slot[kHalf * (i + k)] : 0.0f;
+      }
+#pragma unroll
+      for (int k = 0; k < kAtOnce; ++k) sum += value[k];
     }
   }
-  return sum;
-}
-
-__device__ void SumAllSlots(const OptimizeJob& job, std::uint32_t first, SlotSums& out) {
-  const int lane = static_cast<int>(threadIdx.x) % kHalf;
-  for (int i = static_cast<int>(threadIdx.x) / kHalf; i < kRecords; i += kHalves) {
-    bool seen = false;
-    const std::uint32_t record = first + static_cast<std::uint32_t>(i);
-    if (record < job.scene.records) out.sum[i][lane] = SumSlots(job, record, lane, seen);
-    if (lane == 0) out.seen[i] = seen;
-  }
-  __syncthreads();
+  job.slot_sums[kHalf * static_cast<std::size_t>(record) + lane] = sum;
+  if (lane == 0) job.record_seen[record] = any != 0 ? 1 : 0;
 }
 
 /// Gradient of a Gaussian with respect to its tangent.
@@ -208,22 +197,17 @@ __device__ void AddScaleTerm(const AdamRates& rates,
   }
 }
 
-__global__ void __launch_bounds__(kThreads) OptimizeKernel(OptimizeJob job) {
-  __shared__ SlotSums sums;
-  const std::uint32_t first = blockIdx.x * kRecords;
-  const std::uint32_t last = min(first + kRecords, job.scene.records);
-  if (job.scene.slot_begin[first] == job.scene.slot_begin[last]) return;
-  SumAllSlots(job, first, sums);
-  const std::uint32_t record = first + threadIdx.x;
-  if (threadIdx.x >= kRecords || record >= last || !sums.seen[threadIdx.x]) return;
-
+__global__ void __launch_bounds__(kThreads) AdamKernel(OptimizeJob job) {
   const SceneJob& scene = job.scene;
+  const std::uint32_t record = blockIdx.x * kThreads + threadIdx.x;
+  if (record >= scene.records || job.record_seen[record] == 0) return;
   const GaussianBlock block = scene.blocks[record / kBlockSize];
+  const AnchorTransform<float>& T_sensor_anchor = scene.transforms[block.transform];
   const std::size_t row = block.begin + record % kBlockSize;
   TangentGradient gradient = GradientOf(scene.view,
                                         scene.record[record],
-                                        scene.transforms[block.transform].rotation,
-                                        sums.sum[threadIdx.x]);
+                                        T_sensor_anchor.rotation,
+                                        job.slot_sums + kHalf * static_cast<std::size_t>(record));
   float& log_scale_u = At(scene.gaussians, kLogScaleU, row);
   float& log_scale_v = At(scene.gaussians, kLogScaleV, row);
   AddScaleTerm(job.rates, log_scale_u, log_scale_v, gradient);
@@ -249,13 +233,17 @@ __global__ void __launch_bounds__(kThreads) OptimizeKernel(OptimizeJob job) {
              kSecondOpacity,
              rates.opacity_logit_step,
              gradient.opacity_logit);
+  scene.record[record] = RecordOf(scene.view, LoadSurfel(scene.gaussians, row, T_sensor_anchor));
 }
 
 }  // namespace
 
 void Optimize(const OptimizeJob& job, cudaStream_t stream) {
   if (job.scene.records == 0) return;
-  OptimizeKernel<<<CeilDivide(job.scene.records, kRecords), kThreads, 0, stream>>>(job);
+  const std::size_t records = job.scene.records;
+  SumSlotsKernel<<<CeilDivide(kHalf * records, kThreads), kThreads, 0, stream>>>(job);
+  CheckLaunch("adding up gradients");
+  AdamKernel<<<CeilDivide(records, kThreads), kThreads, 0, stream>>>(job);
   CheckLaunch("optimising");
 }
 

@@ -1,6 +1,8 @@
-// Tiles: half a warp blends one tile of 4 x 4 pixels, one pixel per lane, evaluates the loss, and
-// walks back to front for the gradient. The two halves of a warp take the same turns, so that votes
-// and sums stay within the warp. The formulas are those of cpu/rasterize.cpp.
+// Tiles: one block of threads for each tile of 4 x 4 pixels. Its list is cut into segments, one for
+// every half warp, whose lanes are the pixels: what a segment lets through is a product, so that
+// all segments can blend at once when the products are known, and the gradient can walk all of them
+// back to front at once when each one's sums are known. The two halves of a warp take the same
+// turns, so that votes and sums stay within the warp. The formulas are those of cpu/rasterize.cpp.
 #include "covsplat/splat/cuda/device_math.cuh"
 #include "covsplat/splat/cuda/kernels.hpp"
 
@@ -8,14 +10,13 @@ namespace covsplat::cuda {
 namespace {
 
 constexpr int kHalf = static_cast<int>(kTilePixels);
-constexpr int kWarps = 2;  // per block
-constexpr int kThreads = kWarps * kWarpSize;
-constexpr int kTilesPerBlock = 2 * kWarps;
-constexpr int kBlocksPerProcessor = 10;  // leaves the gradient registers enough not to spill
-constexpr int kBatch = kHalf;            // records that half a warp reads at once
-constexpr std::size_t kRecordParts = sizeof(SurfelRecord<float>) / sizeof(float4);
+constexpr int kSegments = 8;
+constexpr int kThreads = kSegments * kHalf;
+constexpr int kBlocksPerProcessor = 6;  // leaves the gradient registers enough not to spill
+constexpr int kBatch = kHalf;           // records that half a warp reads at once
+constexpr int kRecordParts = static_cast<int>(sizeof(SurfelRecord<float>) / sizeof(float4));
 
-/// The next records of a tile's list. `spread` puts the halves of a warp on different banks.
+/// The next records of a segment. `spread` puts the halves of a warp on different banks.
 struct Batch {
   SurfelRecord<float> record[kBatch];
   TilePair pair[kBatch];
@@ -23,29 +24,50 @@ struct Batch {
 };
 static_assert(sizeof(Batch) % 128 == 64);
 
-/// A lane's place: its tile, its pixel and the ray through it.
-struct Place {
-  int half, lane;  ///< of the warp; of the half
-  int tile;
-  float3 ray;
-  float column, row;  ///< of the pixel's centre, px
-  float columns;      ///< of the whole image, for the wrap
+/// What the segments of a tile know of each other, for each pixel.
+struct SegmentSums {
+  float survival[kSegments][kHalf];       ///< product of 1 - alpha, wherever the ray stops
+  float transmittance[kSegments][kHalf];  ///< behind the segment
+  float range_sum[kSegments][kHalf];
+  float normal[3][kSegments][kHalf];
+  float median[kSegments][kHalf];  ///< negative: no Gaussian here was met with more than half left
+  int kept[kSegments];             ///< entries that some pixel sees
 };
 
-__device__ Place FindPlace(const DeviceView& view) {
+struct TileMemory {
+  Batch batch[kSegments];
+  SegmentSums sums;
+};
+
+/// A lane's place: its segment of the tile's list, its pixel and the ray through it.
+struct Place {
+  int segment, half, lane;  ///< half: of the warp; lane: of the half, and pixel of the tile
+  std::uint32_t begin;      ///< of the segment
+  int length;               ///< of the segment
+  int longest;              ///< of the segments of the warp
+  float3 ray;
+  float column, row;  ///< of the pixel's centre, px
+};
+
+/// `length`: of the whole list.
+__device__ Place FindPlace(const DeviceView& view, int tile, std::uint32_t begin, int length) {
   Place p;
-  p.half = static_cast<int>(threadIdx.x / kHalf) % 2;
+  p.segment = static_cast<int>(threadIdx.x) / kHalf;
+  p.half = p.segment % 2;
   p.lane = static_cast<int>(threadIdx.x) % kHalf;
-  p.tile = static_cast<int>(blockIdx.x) * kTilesPerBlock + static_cast<int>(threadIdx.x) / kHalf;
-  const int x = p.tile % view.tile_columns;
-  const int y = min(p.tile / view.tile_columns, view.tile_rows - 1);
+  const int share = (length + kSegments - 1) / kSegments;
+  const int first = min(p.segment * share, length);
+  p.begin = begin + static_cast<std::uint32_t>(first);
+  p.length = min(share, length - first);
+  p.longest = max(p.length, __shfl_xor_sync(kWholeWarp, p.length, kHalf));
+  const int x = tile % view.tile_columns;
+  const int y = tile / view.tile_columns;
   const float cos_el = view.cos_elevation[kHalf * y + p.lane];
   p.ray = {cos_el * view.cos_azimuth[kHalf * x + p.lane],
            cos_el * view.sin_azimuth[kHalf * x + p.lane],
            view.sin_elevation[kHalf * y + p.lane]};
   p.column = static_cast<float>(kTileSide * x + p.lane % kTileSide) + 0.5f;
   p.row = static_cast<float>(kTileSide * y + p.lane / kTileSide) + 0.5f;
-  p.columns = static_cast<float>(view.columns);
   return p;
 }
 
@@ -54,29 +76,24 @@ __device__ bool AnyInHalf(unsigned votes, int half) {
   return ((votes >> (kHalf * half)) & 0xffffu) != 0;
 }
 
-/// Largest value of each `lanes` neighbouring lanes.
-__device__ int MaxOver(int lanes, int value) {
-  for (int width = lanes / 2; width > 0; width /= 2) {
-    value = max(value, __shfl_xor_sync(kWholeWarp, value, width));
-  }
-  return value;
-}
-
-/// Reads entries [begin, begin + count) of a list, at most kBatch; the rest is invisible.
+/// Reads entries from `base` on, at most kBatch, unless the segments of the warp fit into one batch
+/// that is there already. What is behind a segment's end is invisible.
 __device__ void LoadBatch(
-    const RasterJob& job, std::uint32_t begin, int count, const Place& place, Batch& batch) {
+    const RasterJob& job, const Place& place, int base, bool first_pass, Batch& batch) {
+  if (!first_pass && place.longest <= kBatch) return;
   __syncwarp();
+  const int count = place.length - base;
   TilePair pair{};
-  if (place.lane < count) pair = job.pairs[begin + static_cast<std::uint32_t>(place.lane)];
+  if (place.lane < count)
+    pair = job.pairs[place.begin + static_cast<std::uint32_t>(base + place.lane)];
   batch.pair[place.lane] = pair;
   const auto* from = reinterpret_cast<const float4*>(job.record);
   auto* to = reinterpret_cast<float4*>(batch.record);
-  constexpr int kParts = static_cast<int>(kRecordParts);
-  for (int i = 0; i < kParts; ++i) {
-    const int entry = (kHalf / kParts) * i + place.lane / kParts;
-    const std::uint32_t record = __shfl_sync(kWholeWarp, pair.record, entry, kHalf);
+  for (int i = 0; i < kRecordParts; ++i) {
+    const int entry = (kHalf / kRecordParts) * i + place.lane / kRecordParts;
+    const std::size_t record = __shfl_sync(kWholeWarp, pair.record, entry, kHalf);
     float4 part{0.0f, 0.0f, 0.0f, 0.0f};
-    if (entry < count) part = from[kRecordParts * record + place.lane % kParts];
+    if (entry < count) part = from[kRecordParts * record + place.lane % kRecordParts];
     to[kHalf * i + place.lane] = part;
   }
   __syncwarp();
@@ -101,8 +118,8 @@ __device__ Meeting Meet(const DeviceView& view, const Place& p, const SurfelReco
   m.a = m.t * m.u_ray - s.u_c;
   m.b = m.t * m.v_ray - s.v_c;
   m.dx = s.column - p.column;
-  const float half_turn = 0.5f * p.columns;
-  m.dx += m.dx > half_turn ? -p.columns : m.dx < -half_turn ? p.columns : 0.0f;
+  const float turn = static_cast<float>(view.columns);
+  m.dx += m.dx > 0.5f * turn ? -turn : m.dx < -0.5f * turn ? turn : 0.0f;
   m.dy = s.row - p.row;
   const float surface = m.a * m.a + m.b * m.b;
   const float filter = view.lowpass * (m.dx * m.dx + m.dy * m.dy);
@@ -112,11 +129,11 @@ __device__ Meeting Meet(const DeviceView& view, const Place& p, const SurfelReco
   return m;
 }
 
-/// What a pixel has gathered so far; entries number the tile's list.
+/// What a pixel has gathered so far; entries are numbered within the segment.
 struct Blend {
   float transmittance = 1.0f;
   float range_sum = 0.0f;
-  float median = 0.0f;
+  float median = -1.0f;
   float3 normal = {0.0f, 0.0f, 0.0f};
   int median_entry = -1;
   int last_entry = -1;  ///< the last one seen
@@ -138,34 +155,123 @@ __device__ void BlendSurfel(const Meeting& m,
   blend.last_entry = entry;
 }
 
-/// Blends the lists of a warp's two tiles; `length`: of the lane's own, 0 to leave it out. With
-/// drop_unseen the entries that some pixel sees move together and the list ends behind them.
-__device__ Blend
-BlendTile(const RasterJob& job, const Place& place, std::uint32_t begin, int length, Batch& batch) {
-  Blend blend;
+/// What a segment lets through if nothing is in front of it.
+__device__ float Survival(const RasterJob& job, const Place& place, Batch& batch) {
+  float survival = 1.0f;
+  for (int base = 0; base < place.longest; base += kBatch) {
+    LoadBatch(job, place, base, true, batch);
+    const int count = min(kBatch, place.longest - base);
+#pragma unroll 4
+    for (int i = 0; i < count; ++i) {
+      const float alpha = Meet(job.view, place, batch.record[i]).alpha;
+      survival *= alpha >= job.view.alpha_min ? 1.0f - alpha : 1.0f;
+    }
+  }
+  return survival;
+}
+
+/// Blends a segment from the transmittance in front of it. With drop_unseen the entries that some
+/// pixel sees are copied, in order; returns how many there are.
+__device__ int BlendSegment(const RasterJob& job, const Place& place, Batch& batch, Blend& blend) {
   int kept = 0;
-  const int longest = MaxOver(kWarpSize, length);
-  for (int base = 0; base < longest; base += kBatch) {
-    LoadBatch(job, begin + static_cast<std::uint32_t>(base), length - base, place, batch);
-    for (int i = 0; i < kBatch; ++i) {
+  for (int base = 0; base < place.longest; base += kBatch) {
+    const bool goes_on = base < place.length && blend.transmittance > job.view.transmittance_min;
+    if (!__any_sync(kWholeWarp, goes_on)) break;
+    LoadBatch(job, place, base, false, batch);
+    const int count = min(kBatch, place.longest - base);
+    for (int i = 0; i < count; ++i) {
       const SurfelRecord<float>& s = batch.record[i];
       const Meeting m = Meet(job.view, place, s);
       const bool seen =
           m.alpha >= job.view.alpha_min && blend.transmittance > job.view.transmittance_min;
+      if (seen) BlendSurfel(m, s, base + i, blend);
+      if (!job.drop_unseen) continue;
       const unsigned votes = __ballot_sync(kWholeWarp, seen);
-      if (votes == 0) continue;
-      if (seen) BlendSurfel(m, s, job.drop_unseen ? kept : base + i, blend);
-      if (!job.drop_unseen || !AnyInHalf(votes, place.half)) continue;
-      if (place.lane == 0) job.pairs[begin + static_cast<std::uint32_t>(kept)] = batch.pair[i];
+      if (!AnyInHalf(votes, place.half)) continue;
+      if (place.lane == 0) {
+        job.kept_pairs[place.begin + static_cast<std::uint32_t>(kept)] = batch.pair[i];
+      }
       ++kept;
     }
-    const bool goes_on = base + kBatch < length && blend.transmittance > job.view.transmittance_min;
-    if (!__any_sync(kWholeWarp, goes_on)) break;
   }
-  if (job.drop_unseen && length > 0 && place.lane == 0) {
-    job.tile_end[place.tile] = begin + static_cast<std::uint32_t>(kept);
+  return kept;
+}
+
+/// Moves the segments' kept entries together, front to back, and ends the list behind them.
+__device__ void CloseGaps(
+    const RasterJob& job, int tile, std::uint32_t begin, int length, const SegmentSums& sums) {
+  const int lane = static_cast<int>(threadIdx.x);
+  if (lane >= kWarpSize) return;
+  const int share = (length + kSegments - 1) / kSegments;
+  int end = 0;
+  for (int segment = 0; segment < kSegments; ++segment) {
+    for (int k = lane; k - lane < sums.kept[segment]; k += kWarpSize) {
+      TilePair pair{};
+      const bool mine = k < sums.kept[segment];
+      if (mine) pair = job.kept_pairs[begin + static_cast<std::uint32_t>(segment * share + k)];
+      __syncwarp();
+      if (mine) job.kept_pairs[begin + static_cast<std::uint32_t>(end + k)] = pair;
+      __syncwarp();
+    }
+    end += sums.kept[segment];
   }
-  return blend;
+  if (lane == 0) job.tile_end[tile] = begin + static_cast<std::uint32_t>(end);
+}
+
+/// A pixel of the whole list, and what the gradient needs to know of the segments around its own.
+struct Blended {
+  Blend all;
+  Blend own;
+  Blend later;  ///< sums behind the own segment; transmittance: what they take away
+};
+
+/// Blends a tile with all threads of its block.
+__device__ Blended BlendTile(const RasterJob& job,
+                             const Place& place,
+                             int tile,
+                             std::uint32_t begin,
+                             int length,
+                             TileMemory& memory) {
+  Batch& batch = memory.batch[place.segment];
+  SegmentSums& sums = memory.sums;
+  const int lane = place.lane;
+  sums.survival[place.segment][lane] = Survival(job, place, batch);
+  __syncthreads();
+  Blended result;
+  Blend& own = result.own;
+  for (int s = 0; s < place.segment; ++s) own.transmittance *= sums.survival[s][lane];
+  const int kept = BlendSegment(job, place, batch, own);
+  sums.transmittance[place.segment][lane] = own.transmittance;
+  sums.range_sum[place.segment][lane] = own.range_sum;
+  sums.normal[0][place.segment][lane] = own.normal.x;
+  sums.normal[1][place.segment][lane] = own.normal.y;
+  sums.normal[2][place.segment][lane] = own.normal.z;
+  sums.median[place.segment][lane] = own.median;
+  if (lane == 0) sums.kept[place.segment] = kept;
+  __syncthreads();
+
+  Blend& all = result.all;
+  Blend& later = result.later;
+  later.transmittance = 0.0f;
+  float in_front = 1.0f;
+  for (int s = 0; s < kSegments; ++s) {
+    const float3 normal{sums.normal[0][s][lane], sums.normal[1][s][lane], sums.normal[2][s][lane]};
+    // Behind a ray that has stopped, the product goes on but nothing is seen.
+    if (in_front > job.view.transmittance_min) all.transmittance = sums.transmittance[s][lane];
+    all.range_sum += sums.range_sum[s][lane];
+    all.normal = all.normal + normal;
+    if (sums.median[s][lane] >= 0.0f) all.median = sums.median[s][lane];
+    if (s > place.segment) {
+      later.transmittance += in_front - sums.transmittance[s][lane];
+      later.range_sum += sums.range_sum[s][lane];
+      later.normal = later.normal + normal;
+      later.median = fmaxf(later.median, sums.median[s][lane]);
+    }
+    in_front *= sums.survival[s][lane];
+  }
+  all.median = fmaxf(all.median, 0.0f);
+  if (job.drop_unseen) CloseGaps(job, tile, begin, length, sums);
+  return result;
 }
 
 /// Gradient of the loss with respect to the blended images.
@@ -286,26 +392,28 @@ __device__ void SurfelGradient(const DeviceView& view,
   terms[kSumRange] = m.on_surface ? 0.0f : g_range;
 }
 
-/// Walks the lists back to front with one running suffix sum per pixel. What a pixel saw on the way
+/// Walks a segment back to front with one running suffix sum per pixel. What a pixel saw on the way
 /// out is found again from the record and from the last entry that it saw.
-__device__ void BackTile(const StepJob& job,
-                         const Place& place,
-                         std::uint32_t begin,
-                         const Blend& blend,
-                         const ImageGradient& g,
-                         Batch& batch) {
+__device__ void BackSegment(const StepJob& job,
+                            const Place& place,
+                            const Blended& blended,
+                            const ImageGradient& g,
+                            Batch& batch) {
   const DeviceView& view = job.raster.view;
-  float transmittance = blend.transmittance;
-  float suffix = 0.0f;
-  const int length = MaxOver(kHalf, blend.last_entry + 1);
-  const int longest = MaxOver(kWarpSize, length);
-  for (int base = (longest - 1) / kBatch * kBatch; base >= 0 && longest > 0; base -= kBatch) {
-    LoadBatch(job.raster, begin + static_cast<std::uint32_t>(base), length - base, place, batch);
-    for (int i = min(kBatch, longest - base) - 1; i >= 0; --i) {
+  const Blend& own = blended.own;
+  const Blend& later = blended.later;
+  const int median_entry = later.median < 0.0f ? own.median_entry : -1;
+  float transmittance = own.transmittance;
+  float suffix =
+      g.range_sum * later.range_sum + g.alpha * later.transmittance + Dot(g.normal, later.normal);
+  for (int base = (place.longest - 1) / kBatch * kBatch; base >= 0; base -= kBatch) {
+    if (!__any_sync(kWholeWarp, base <= own.last_entry)) continue;
+    LoadBatch(job.raster, place, base, false, batch);
+    for (int i = min(kBatch, place.longest - base) - 1; i >= 0; --i) {
       const SurfelRecord<float>& s = batch.record[i];
       const Meeting m = Meet(view, place, s);
       const int entry = base + i;
-      const bool seen = m.alpha >= view.alpha_min && entry <= blend.last_entry;
+      const bool seen = m.alpha >= view.alpha_min && entry <= own.last_entry;
       const unsigned votes = __ballot_sync(kWholeWarp, seen);
       if (votes == 0) continue;
       float terms[kHalf] = {};
@@ -317,8 +425,7 @@ __device__ void BackTile(const StepJob& job,
         const float gained = weight * (g.range_sum * range + g.alpha + Dot(g.normal, Vector(s.n)));
         const float g_alpha = m.alpha < view.alpha_cap ? gained - suffix * inverse * m.alpha : 0.0f;
         suffix += gained;
-        const float g_range =
-            weight * g.range_sum + (entry == blend.median_entry ? g.median : 0.0f);
+        const float g_range = weight * g.range_sum + (entry == median_entry ? g.median : 0.0f);
         SurfelGradient(view, place, s, m, weight, g_alpha, g_range, g, terms);
       }
       const float sum = SumEach(terms, place.lane);
@@ -338,15 +445,14 @@ __device__ float SumOfHalf(float value) {
 }
 
 __global__ void __launch_bounds__(kThreads) RenderKernel(RasterJob job, RenderImages images) {
-  __shared__ Batch batches[kTilesPerBlock];
-  const Place place = FindPlace(job.view);
-  Batch& batch = batches[threadIdx.x / kHalf];
-  const bool inside = place.tile < job.view.tiles;
-  const std::uint32_t begin = inside ? job.tile_begin[place.tile] : 0;
-  const int length = inside ? static_cast<int>(job.tile_end[place.tile] - begin) : 0;
-  const Blend blend = BlendTile(job, place, begin, length, batch);
+  __shared__ TileMemory memory;
+  const int tile = static_cast<int>(blockIdx.x);
+  const std::uint32_t begin = job.tile_begin[tile];
+  const int length = static_cast<int>(job.tile_end[tile] - begin);
+  const Place place = FindPlace(job.view, tile, begin, length);
+  const Blend blend = BlendTile(job, place, tile, begin, length, memory).all;
   const int row = static_cast<int>(place.row);
-  if (!inside || row >= job.view.rows) return;
+  if (place.segment > 0 || row >= job.view.rows) return;
   const std::size_t pixel =
       static_cast<std::size_t>(row) * static_cast<std::size_t>(job.view.columns) +
       static_cast<std::size_t>(place.column);
@@ -365,26 +471,28 @@ __global__ void __launch_bounds__(kThreads) RenderKernel(RasterJob job, RenderIm
 
 /// Tiles without any measurement are left out.
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) StepKernel(StepJob job) {
-  __shared__ Batch batches[kTilesPerBlock];
+  __shared__ TileMemory memory;
   const DeviceView& view = job.raster.view;
-  const Place place = FindPlace(view);
-  Batch& batch = batches[threadIdx.x / kHalf];
-  const bool inside = place.tile < view.tiles;
+  const int tile = static_cast<int>(blockIdx.x);
+  const int lane = static_cast<int>(threadIdx.x) % kHalf;
   const std::size_t pixel =
-      kTilePixels * static_cast<std::size_t>(place.tile) + static_cast<std::size_t>(place.lane);
-  const float measured =
-      inside ? job.targets.range_step_m * static_cast<float>(job.targets.range[pixel]) : 0.0f;
-  const bool wanted = AnyInHalf(__ballot_sync(kWholeWarp, measured > 0.0f), place.half);
-  const std::uint32_t begin = wanted ? job.raster.tile_begin[place.tile] : 0;
-  const int length = wanted ? static_cast<int>(job.raster.tile_end[place.tile] - begin) : 0;
-  const Blend blend = BlendTile(job.raster, place, begin, length, batch);
-  ImageGradient gradient;
-  const PixelLosses losses = PixelLoss(job, pixel, measured, blend, gradient);
+      kTilePixels * static_cast<std::size_t>(tile) + static_cast<std::size_t>(lane);
+  const float measured = job.targets.range_step_m * static_cast<float>(job.targets.range[pixel]);
+  PixelLosses losses;
+  if (__any_sync(kWholeWarp, measured > 0.0f)) {  // both halves of all warps ask the same pixels
+    const std::uint32_t begin = job.raster.tile_begin[tile];
+    const int length = static_cast<int>(job.raster.tile_end[tile] - begin);
+    const Place place = FindPlace(view, tile, begin, length);
+    const Blended blended = BlendTile(job.raster, place, tile, begin, length, memory);
+    ImageGradient gradient;
+    losses = PixelLoss(job, pixel, measured, blended.all, gradient);
+    BackSegment(job, place, blended, gradient, memory.batch[place.segment]);
+  }
+  if (threadIdx.x >= kWarpSize) return;
   for (int term = 0; term < kLossTermCount; ++term) {
     const float sum = SumOfHalf(losses.term[term]);
-    if (inside && place.lane == 0) job.tile_losses[term * view.tiles + place.tile] = sum;
+    if (threadIdx.x == 0) job.tile_losses[term * view.tiles + tile] = sum;
   }
-  BackTile(job, place, begin, blend, gradient, batch);
 }
 
 constexpr int kSumThreads = 1024;
@@ -403,22 +511,18 @@ __global__ void SumLossesKernel(const float* tile_losses, int tiles, double* sum
   if (threadIdx.x == 0) sums[blockIdx.x] = partial[0];
 }
 
-unsigned Blocks(const DeviceView& view) {
-  return CeilDivide(static_cast<std::size_t>(view.tiles), kTilesPerBlock);
-}
-
 }  // namespace
 
 void RenderTiles(const RasterJob& job, const RenderImages& images, cudaStream_t stream) {
-  RenderKernel<<<Blocks(job.view), kThreads, 0, stream>>>(job, images);
+  RenderKernel<<<job.view.tiles, kThreads, 0, stream>>>(job, images);
   CheckLaunch("rendering");
 }
 
 void StepTiles(const StepJob& job, double* sums, cudaStream_t stream) {
-  const DeviceView& view = job.raster.view;
-  StepKernel<<<Blocks(view), kThreads, 0, stream>>>(job);
+  const int tiles = job.raster.view.tiles;
+  StepKernel<<<tiles, kThreads, 0, stream>>>(job);
   CheckLaunch("rendering a view");
-  SumLossesKernel<<<kLossTermCount, kSumThreads, 0, stream>>>(job.tile_losses, view.tiles, sums);
+  SumLossesKernel<<<kLossTermCount, kSumThreads, 0, stream>>>(job.tile_losses, tiles, sums);
   CheckLaunch("adding up losses");
 }
 
