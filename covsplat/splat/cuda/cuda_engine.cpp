@@ -169,7 +169,9 @@ LossWeights CudaEngine::WeightsOf(const CompactView& view) const {
           .per_opacity = static_cast<float>(loss.opacity) * per_range,
           .per_normal = static_cast<float>(loss.gicp_normal) * per_normal,
           .per_surface = static_cast<float>(loss.surface_normal) * per_range,
-          .opacity_epsilon = static_cast<float>(loss.opacity_epsilon)};
+          .opacity_epsilon = static_cast<float>(loss.opacity_epsilon),
+          .hidden_factor = static_cast<float>(1.0 + loss.hidden_margin_ratio),
+          .hidden_margin_m = static_cast<float>(loss.hidden_margin_m)};
 }
 
 void CudaEngine::SetView(int anchor, const RangeMeasurement& measurement) {

@@ -91,6 +91,7 @@ struct DeviceTargets {
 struct LossWeights {
   float per_range, per_opacity, per_normal, per_surface;
   float opacity_epsilon;
+  float hidden_factor, hidden_margin_m;  ///< hidden from: factor * measured range + margin
 };
 
 enum LossTerm : int { kLossRange, kLossOpacity, kLossNormal, kLossTermCount };

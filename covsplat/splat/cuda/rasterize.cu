@@ -280,6 +280,7 @@ struct ImageGradient {
   float range_sum = 0.0f;
   float median = 0.0f;
   float3 normal = {0.0f, 0.0f, 0.0f};
+  float hidden_from = 0.0f;  ///< Gaussians from this range on have no gradient
 };
 
 struct PixelLosses {
@@ -307,6 +308,7 @@ __device__ PixelLosses PixelLoss(
   const float alpha = 1.0f - blend.transmittance;
   const float opaque = alpha + weights.opacity_epsilon;
   g.alpha = -weights.per_opacity / opaque;
+  g.hidden_from = weights.hidden_factor * measured + weights.hidden_margin_m;
   losses.term[kLossOpacity] = -weights.per_opacity * logf(fmaxf(opaque, 1e-20f));
   if (!(alpha > view.min_alpha)) return losses;
 
@@ -426,7 +428,9 @@ __device__ void BackSegment(const StepJob& job,
         const float g_alpha = m.alpha < view.alpha_cap ? gained - suffix * inverse * m.alpha : 0.0f;
         suffix += gained;
         const float g_range = weight * g.range_sum + (entry == median_entry ? g.median : 0.0f);
-        SurfelGradient(view, place, s, m, weight, g_alpha, g_range, g, terms);
+        if (range < g.hidden_from) {
+          SurfelGradient(view, place, s, m, weight, g_alpha, g_range, g, terms);
+        }
       }
       const float sum = SumEach(terms, place.lane);
       if (!AnyInHalf(votes, place.half)) continue;
