@@ -1,6 +1,6 @@
 # The short way to everything; CMake presets do the work.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test bench bench-peers oracles check-map format tidy docs clean
+.PHONY: help setup demo test cuda bench bench-peers oracles check-map format tidy docs clean
 
 COVSPLAT_DATA ?= ../shared/data
 THREADS ?= 2
@@ -26,6 +26,11 @@ demo: setup  ## Simulate a recording, run the SLAM on it, write demo_out/report.
 
 test: setup build-dev  ## Build with warnings as errors and run every test
 	ctest --preset dev
+
+cuda: setup  ## Build with the CUDA backend into build/cuda
+	@tools/setup.sh --with-python
+	@cmake --preset release -B build/cuda $$(tools/setup_cuda.sh) >/dev/null
+	cmake --build build/cuda
 
 bench: setup build-release  ## Run the benchmarks
 	@for b in build/release/bench/*_bench; do \

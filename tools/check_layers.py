@@ -2,6 +2,7 @@
 """Checks that includes follow the allowed dependencies between modules; `--graph` prints them.
 
 The table below is the architecture: a module may include itself, core, and what is listed here.
+Headers of CUDA are for splat/cuda alone.
 """
 import pathlib
 import re
@@ -23,16 +24,19 @@ EDGES = {
              "splat"],
 }
 INCLUDE = re.compile(r'#include\s+"covsplat/(\w+)/')
+CUDA = re.compile(r"#include\s+<(cuda|cub/)")
 
 
 def violations(root: pathlib.Path):
     for module, allowed in EDGES.items():
         folder = root / ("apps" if module == "apps" else f"covsplat/{module}")
-        for path in sorted(folder.rglob("*.?pp")):
+        for path in sorted(p for end in ("?pp", "cu", "cuh") for p in folder.rglob(f"*.{end}")):
             for number, line in enumerate(path.read_text().splitlines(), 1):
                 match = INCLUDE.search(line)
                 if match and match[1] not in {module, "core", *allowed}:
                     yield f"{path.relative_to(root)}:{number}: {module} may not include {match[1]}"
+                if CUDA.match(line) and path.parent != root / "covsplat/splat/cuda":
+                    yield f"{path.relative_to(root)}:{number}: CUDA stays in splat/cuda"
 
 
 def main() -> int:

@@ -163,6 +163,26 @@ Both RoomEngines(std::unique_ptr<SplatEngine> cuda,
   return both;
 }
 
+/// A measurement that random Gaussians almost explain, at some pixels.
+RangeMeasurement Explained(const RenderOutput& render) {
+  RangeMeasurement m{render.range_m, render.normal};
+  Rng rng(5);
+  for (std::size_t i = 0; i < m.range_m.Size(); ++i) {
+    float& range = m.range_m.Pixels()[i];
+    if (range > 0.0f && rng.Uniform() < 0.7) {
+      range += static_cast<float>(rng.Uniform(0.3, 0.6) * (rng.Uniform() < 0.5 ? -1.0 : 1.0));
+    } else {
+      range = 0.0f;
+    }
+    Eigen::Vector3f& normal = m.normal.Pixels()[i];
+    normal = (normal + 0.3f * Eigen::Vector3f(static_cast<float>(rng.Normal()),
+                                              static_cast<float>(rng.Normal()),
+                                              static_cast<float>(rng.Normal())))
+                 .normalized();
+  }
+  return m;
+}
+
 SE3 SomePose() { return SE3::Exp((Vector6d() << 0.1, 0.2, -0.4, 10.0, -5.0, 2.0).finished()); }
 
 TEST_F(CudaEngineTest, SaysWhatItIs) {
@@ -217,6 +237,28 @@ TEST_F(CudaEngineTest, RendersWhatEveryGaussianOnEveryPixelGives) {
   ExpectClose(z, twin_z, 2e-4, 0.01, "normal");
 }
 
+TEST_F(CudaEngineTest, LongListsAreBlendedAsShortOnesAre) {
+  // Hundreds of faint Gaussians on most tiles: every segment of a list needs several batches.
+  GaussianColumns<float> table = RandomGaussians<float>(3000, 0.0, 31);
+  std::fill_n(table.Column(kOpacityLogit), table.Size(), -3.5f);
+  Both both{Make(Backend::kCuda, SmallSensor()), Make(Backend::kCpu, SmallSensor())};
+  both.Do([&](SplatEngine& engine) {
+    engine.AddAnchor(SE3());
+    engine.Append(0, table);
+  });
+  const RenderOutput render = both.cpu->Render(SE3());
+  ExpectSameRendering(both.cuda->Render(SE3()), render, "faint Gaussians");
+  const RangeMeasurement m = Explained(render);
+  both.Do([&](SplatEngine& engine) { engine.SetView(0, m); });
+  for (int step = 0; step < 2; ++step) {
+    const StepReport on_cuda = both.cuda->Step(0, true);
+    const StepReport on_cpu = both.cpu->Step(0, true);
+    EXPECT_NEAR(on_cuda.range_loss, on_cpu.range_loss, 1e-3 * on_cpu.range_loss);
+    EXPECT_GT(on_cpu.pairs, 128u * 5u * 16u);  // so many for each tile, though most are empty
+  }
+  ExpectMovedAlike(*both.cuda, *both.cpu, table, 0.15, "faint Gaussians");
+}
+
 struct Switch {
   const char* name;
   void (*set)(EngineConfig&);
@@ -242,6 +284,9 @@ constexpr Switch kSwitches[] = {
     {"strong surface_normal", [](EngineConfig& c) { c.loss.surface_normal = 5.0; }},
     {"scale", [](EngineConfig& c) { c.loss.max_scale_m = 0.09; }},
     {"min_alpha", [](EngineConfig& c) { c.loss.min_alpha = 0.7; }},
+    {"nothing is hidden", [](EngineConfig& c) { c.loss.hidden_margin_m = 1e6; }},
+    {"hidden_margin_m", [](EngineConfig& c) { c.loss.hidden_margin_m = 0.0; }},
+    {"hidden_margin_ratio", [](EngineConfig& c) { c.loss.hidden_margin_ratio = 1.0; }},
     {"mean_along_normal", [](EngineConfig& c) { c.optimizer.mean_along_normal = false; }},
     {"betas", [](EngineConfig& c) { c.optimizer.beta1 = 0.5, c.optimizer.beta2 = 0.9; }},
 };
@@ -270,26 +315,6 @@ TEST_F(CudaEngineTest, EverySwitchDoesWhatItDoesOnTheCpu) {
     }
     ExpectMovedAlike(*both.cuda, *both.cpu, start, 0.15, s.name);
   }
-}
-
-/// A measurement that random Gaussians almost explain, at some pixels.
-RangeMeasurement Explained(const RenderOutput& render) {
-  RangeMeasurement m{render.range_m, render.normal};
-  Rng rng(5);
-  for (std::size_t i = 0; i < m.range_m.Size(); ++i) {
-    float& range = m.range_m.Pixels()[i];
-    if (range > 0.0f && rng.Uniform() < 0.7) {
-      range += static_cast<float>(rng.Uniform(0.3, 0.6) * (rng.Uniform() < 0.5 ? -1.0 : 1.0));
-    } else {
-      range = 0.0f;
-    }
-    Eigen::Vector3f& normal = m.normal.Pixels()[i];
-    normal = (normal + 0.3f * Eigen::Vector3f(static_cast<float>(rng.Normal()),
-                                              static_cast<float>(rng.Normal()),
-                                              static_cast<float>(rng.Normal())))
-                 .normalized();
-  }
-  return m;
 }
 
 TEST_F(CudaEngineTest, OneStepGoesAlongTheGradientInDouble) {

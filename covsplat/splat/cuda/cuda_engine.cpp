@@ -235,6 +235,15 @@ RenderImages CudaEngine::Images() {
           .normal = base + 3 * pixels};
 }
 
+/// Asks how much scratch memory binning needs only where it is more than before: asking takes time.
+void CudaEngine::ReserveScratch(std::size_t records, std::size_t pairs) {
+  if (records <= scratch_records_ && pairs <= scratch_pairs_) return;
+  scratch_records_ = std::max(scratch_records_, records + records / 2);
+  scratch_pairs_ = std::max(scratch_pairs_, pairs + pairs / 2);
+  scratch_.Reserve(
+      BinScratchBytes(static_cast<std::uint32_t>(scratch_records_), scratch_pairs_, view_.tiles));
+}
+
 /// Projects, and finds how many pairs there are: the one number that the host has to wait for.
 std::uint32_t CudaEngine::FindPairs() {
   const std::size_t records = kBlockSize * blocks_.size();
@@ -245,7 +254,7 @@ std::uint32_t CudaEngine::FindPairs() {
   slot_begin_.Reserve(records + 1);
   slot_sums_.Reserve(kTilePixels * records);
   record_seen_.Reserve(records);
-  scratch_.Reserve(BinScratchBytes(static_cast<std::uint32_t>(records), 0, view_.tiles));
+  ReserveScratch(records, 0);
   ProjectAll(Scene(), Bins(), stream_);
   CountPairs(Scene(), Bins(), scratch_.Data(), scratch_.Capacity(), stream_);
   CheckCuda(cudaMemcpyAsync(pinned_count_.Data(),
@@ -273,7 +282,7 @@ void CudaEngine::LookFrom(const SE3& T_map_sensor) {
   kept_pairs_.Reserve(pair_count_);
   slots_.Reserve(kTilePixels * static_cast<std::size_t>(pair_count_));
   slot_used_.Reserve(pair_count_);
-  scratch_.Reserve(BinScratchBytes(Scene().records, pair_count_, view_.tiles));
+  ReserveScratch(kBlockSize * blocks_.size(), pair_count_);
   SortPairs(Scene(), Bins(), pair_count_, scratch_.Data(), scratch_.Capacity(), stream_);
   if (pair_count_ > 0) {
     CheckCuda(cudaMemsetAsync(slot_used_.Data(), 0, pair_count_, stream_), "emptying slots");

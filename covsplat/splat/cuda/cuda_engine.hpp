@@ -44,7 +44,7 @@ class CudaEngine final : public SplatEngine {
   AdamRates Rates() const;
   void LookFrom(const SE3& T_map_sensor);
   std::uint32_t FindPairs();
-  void RenderCurrent();
+  void ReserveScratch(std::size_t records, std::size_t pairs);
   void BeginView(int anchor, bool surface_normals);
   SceneJob Scene();
   BinJob Bins();
@@ -83,6 +83,7 @@ class CudaEngine final : public SplatEngine {
   DeviceBuffer<std::uint32_t> keys_, sorted_keys_, slot_numbers_, sorted_slots_, record_of_slot_;
   DeviceBuffer<TilePair> pairs_, kept_pairs_;
   DeviceBuffer<char> scratch_;
+  std::size_t scratch_records_ = 0, scratch_pairs_ = 0;  ///< that the scratch memory is enough for
   DeviceBuffer<float> slots_, slot_sums_;
   DeviceBuffer<std::uint8_t> slot_used_, record_seen_;
   DeviceBuffer<float> images_, surface_, tile_losses_;

@@ -6,9 +6,9 @@ namespace covsplat::cuda {
 namespace {
 
 tl::unexpected<Error> NotBuilt() {
-  return Fail(ErrorCode::kUnavailable,
-              "this build has no CUDA backend; use --backend cpu (or auto), or build again with "
-              "cmake --preset release $(tools/setup_cuda.sh)");
+  return Fail(
+      ErrorCode::kUnavailable,
+      "this build has no CUDA backend; use --backend cpu (or auto), or build with make cuda");
 }
 
 }  // namespace
