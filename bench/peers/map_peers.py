@@ -38,11 +38,15 @@ def placed_scans(recording: Recording, trajectory: Trajectory) -> Iterator[tuple
 
 
 def run_tsdf_fusion(
-    recording: Recording, voxel_m: float, mesh: Path, trajectory: Path | None
+    recording: Recording,
+    voxel_m: float,
+    mesh: Path,
+    trajectory: Path | None,
+    truncation_voxels: float,
 ) -> MapOutcome:
     """With the true poses, or those of a TUM file."""
     poses = recording.truth() if trajectory is None else Trajectory.read_tum(trajectory)
-    volume = TsdfVolume(voxel_m)
+    volume = TsdfVolume(voxel_m, truncation_voxels)
     scans, fuse_s = 0, 0.0
     for points, origin in placed_scans(recording, poses):
         start_s = time.perf_counter()

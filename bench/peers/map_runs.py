@@ -73,12 +73,13 @@ def methods(setting: Setting) -> Iterator[tuple[str, Make]]:
     estimated = covsplat_folder(setting.out) / "trajectory_tum.txt"
     yield f"covsplat; {ESTIMATED}", partial(mesh_covsplat, setting)
     tsdf = partial(map_peers.run_tsdf_fusion, recording, voxel_m)
-    for poses, file, trajectory in (
-        (TRUE, "tsdf_true_poses.ply", None),
-        (ESTIMATED, "tsdf_covsplat_poses.ply", estimated),
+    for name, poses, file, trajectory, truncation_voxels in (
+        ("TSDF fusion (as VDBFusion)", TRUE, "tsdf_true_poses.ply", None, 3.0),
+        ("TSDF fusion (as VDBFusion)", ESTIMATED, "tsdf_covsplat_poses.ply", estimated, 3.0),
+        ("TSDF fusion, truncation 2 voxels", TRUE, "tsdf_truncation_2.ply", None, 2.0),
     ):
-        run = partial(tsdf, meshes / file, trajectory)
-        yield f"TSDF fusion (as VDBFusion); {poses}", partial(apart, run)
+        run = partial(tsdf, meshes / file, trajectory, truncation_voxels)
+        yield f"{name}; {poses}", partial(apart, run)
     poisson = partial(
         map_peers.run_poisson, recording, voxel_m, meshes / "poisson.ply", setting.threads
     )

@@ -37,7 +37,7 @@ class TsdfFusionTest(unittest.TestCase):
         """Negative places and a height between voxels, seen at a slant from two sides."""
         rng = np.random.default_rng(1)
         points = np.column_stack([rng.uniform(-3, -1, (40000, 2)), np.full(40000, -0.537)])
-        volume = TsdfVolume(0.1)
+        volume = TsdfVolume(0.1, truncation_voxels=3.0)
         for origin in ([-2.0, -2.0, 1.0], [-1.5, -2.5, 1.5]):
             volume.integrate(points, np.array(origin))
         mesh = volume.mesh()
@@ -48,7 +48,7 @@ class TsdfFusionTest(unittest.TestCase):
 
     def test_a_box_that_spans_tiles_closes_without_seams(self) -> None:
         half = np.array([6.23, 2.07, 1.51])
-        volume = TsdfVolume(0.1)
+        volume = TsdfVolume(0.1, truncation_voxels=3.0)
         for x in (-4.0, 0.0, 4.0):
             origin = np.array([x, 0.3, 0.0])
             volume.integrate(box_scan(origin, half, 60000), origin)
@@ -61,7 +61,7 @@ class TsdfFusionTest(unittest.TestCase):
         self.assertEqual(volume.bytes, len(volume.slots) * BLOCK**3 * 8)
 
     def test_a_ray_updates_every_voxel_it_crosses_within_the_truncation(self) -> None:
-        volume = TsdfVolume(0.1)
+        volume = TsdfVolume(0.1, truncation_voxels=3.0)
         point, origin = np.array([[1.0, 0.71, 0.33]]), np.zeros(3)
         volume.integrate(point, origin)
         depth_m = np.linalg.norm(point)
@@ -73,11 +73,11 @@ class TsdfFusionTest(unittest.TestCase):
 
     def test_what_was_measured_seldom_can_be_left_out(self) -> None:
         points = np.column_stack([np.random.default_rng(2).uniform(0, 1, (5000, 2)), np.ones(5000)])
-        volume = TsdfVolume(0.1)
+        volume = TsdfVolume(0.1, truncation_voxels=3.0)
         volume.integrate(points, np.array([0.5, 0.5, 3.0]))
         self.assertGreater(len(volume.mesh().triangles), 0)
         self.assertEqual(len(volume.mesh(min_weight=1e6).triangles), 0)
-        self.assertEqual(len(TsdfVolume(0.1).mesh().triangles), 0)
+        self.assertEqual(len(TsdfVolume(0.1, truncation_voxels=3.0).mesh().triangles), 0)
 
     def test_keys_lead_back_to_their_blocks(self) -> None:
         blocks = np.random.default_rng(3).integers(-(1 << 18), 1 << 18, (1000, 3))

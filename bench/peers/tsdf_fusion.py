@@ -24,7 +24,7 @@ MAX_BLOCKS = 1 << 19  # 2 GiB of voxels
 
 
 class TsdfVolume:
-    def __init__(self, voxel_m: float, truncation_voxels: float = 3.0) -> None:
+    def __init__(self, voxel_m: float, truncation_voxels: float) -> None:
         self.voxel_m = voxel_m
         self.truncation_m = truncation_voxels * voxel_m
         self.slots: dict[int, int] = {}  # key of a block to its place in the arrays
