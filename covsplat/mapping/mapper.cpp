@@ -8,6 +8,21 @@ namespace {
 
 constexpr std::size_t kNearKeyframes = 8;
 
+/// `gone`: ascending indices.
+std::vector<Disc> Without(std::span<const std::size_t> gone, std::span<const Disc> discs) {
+  std::vector<Disc> left;
+  left.reserve(discs.size() - gone.size());
+  auto next = gone.begin();
+  for (std::size_t i = 0; i < discs.size(); ++i) {
+    if (next != gone.end() && *next == i) {
+      ++next;
+    } else {
+      left.push_back(discs[i]);
+    }
+  }
+  return left;
+}
+
 }  // namespace
 
 Mapper::Mapper(std::unique_ptr<SplatEngine> engine,
@@ -19,15 +34,16 @@ Mapper::Mapper(std::unique_ptr<SplatEngine> engine,
 void Mapper::Insert(const Keyframe& keyframe) {
   const ScopedTimer timer(times_, "insert");
   const SE3& T_map_sensor = keyframe.tracked.T_map_sensor;
-  NearGaussians near = map_.Near(T_map_sensor, sensor_.MaxRange());
+  const NearGaussians near = map_.Near(T_map_sensor, sensor_.MaxRange());
   const PatchFit fit = FitPatches(keyframe, near.discs, sensor_, config_.spawn, pool_);
   std::vector<std::size_t> replaced;
   for (const std::size_t i : fit.replaced) replaced.push_back(near.row[i]);
-  if (map_.Remove(replaced) > 0) near = map_.Near(T_map_sensor, sensor_.MaxRange());
+  map_.Remove(replaced);
   std::optional<RenderOutput> render;
   if (map_.Keyframes() > 0) render = Render(T_map_sensor);
-  const SpawnedGaussians spawned = SpawnGaussians(
-      keyframe, fit, render ? &*render : nullptr, near.discs, sensor_, config_.spawn);
+  const std::vector<Disc> staying = Without(fit.replaced, near.discs);
+  const SpawnedGaussians spawned =
+      SpawnGaussians(keyframe, fit, render ? &*render : nullptr, staying, sensor_, config_.spawn);
   const int number = map_.AddKeyframe(keyframe, spawned);
   map_.MarkSeen(number, keyframe, sensor_);
   map_.PruneSeenThrough(config_.prune_seen_through);

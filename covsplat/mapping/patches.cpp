@@ -155,26 +155,37 @@ void FitCells(std::span<const PointCell> cells,
   });
 }
 
-/// Calls f(position) at steps of less than a finest cell over the square that a disc stands for,
-/// a little within its edges, and on both sides close to it.
-template <class F>
-void ForPlacesOf(const Disc& disc, double edge_sigmas, float finest_m, F&& f) {
+/// The square that a disc stands for, a little within its edges.
+struct Square {
+  Eigen::Vector3f middle;
+  Eigen::Vector3f u;  ///< to the middles of its edges
+  Eigen::Vector3f v;
+
+  Eigen::AlignedBox3f Box(const Eigen::Vector3f& margin) const {
+    const Eigen::Vector3f reach = u.cwiseAbs() + v.cwiseAbs() + margin;
+    return {middle - reach, middle + reach};
+  }
+};
+
+Square SquareOf(const Disc& disc, double edge_sigmas, float finest_m) {
   constexpr float kMaxEdgeM = 5.0f;  // maps have none that large; one would take forever
   const auto within = [&](const Eigen::Vector3f& axis) -> Eigen::Vector3f {
     const float length = static_cast<float>(edge_sigmas) * axis.norm() - 0.25f * finest_m;
     return axis.normalized() * std::clamp(length, 0.0f, kMaxEdgeM);
   };
-  const Eigen::Vector3f u = within(disc.u);
-  const Eigen::Vector3f v = within(disc.v);
-  const Eigen::Vector3f off = 0.15f * finest_m * disc.u.cross(disc.v).normalized();
-  const auto steps_u = static_cast<int>(std::round(u.norm() / (0.7f * finest_m)));
-  const auto steps_v = static_cast<int>(std::round(v.norm() / (0.7f * finest_m)));
+  return {disc.mean, within(disc.u), within(disc.v)};
+}
+
+/// Calls f(position) at steps of less than a finest cell over a square.
+template <class F>
+void ForPlacesOf(const Square& square, float finest_m, F&& f) {
+  const auto steps_u = static_cast<int>(std::round(square.u.norm() / (0.7f * finest_m)));
+  const auto steps_v = static_cast<int>(std::round(square.v.norm() / (0.7f * finest_m)));
+  const Eigen::Vector3f step_u = square.u / static_cast<float>(std::max(1, steps_u));
+  const Eigen::Vector3f step_v = square.v / static_cast<float>(std::max(1, steps_v));
   for (int i = -steps_u; i <= steps_u; ++i) {
-    for (int j = -steps_v; j <= steps_v; ++j) {
-      const float a = static_cast<float>(i) / static_cast<float>(std::max(1, steps_u));
-      const float b = static_cast<float>(j) / static_cast<float>(std::max(1, steps_v));
-      for (const float side : {-1.0f, 0.0f, 1.0f}) f(disc.mean + a * u + b * v + side * off);
-    }
+    const Eigen::Vector3f row = square.middle + static_cast<float>(i) * step_u;
+    for (int j = -steps_v; j <= steps_v; ++j) f(row + static_cast<float>(j) * step_v);
   }
 }
 
@@ -189,16 +200,26 @@ DiscsOfCells DensestDiscs(std::span<const Disc> discs_grid,
                        std::vector<int>(static_cast<std::size_t>(grid.CellsPerBlock()), kNone));
   const auto finest_m = static_cast<float>(grid.CellSize(grid.Levels()));
   for (std::size_t i = 0; i < discs_grid.size(); ++i) {
+    const Disc& disc = discs_grid[i];
+    // A disc also passes through cells on either side that are close to it.
+    const Eigen::Vector3f off = 0.15f * finest_m * disc.u.cross(disc.v).normalized();
+    const Square square = SquareOf(disc, kEdgeSigmas / extent_factor, finest_m);
+    if (!grid.HoldsAnyIn(square.Box(off.cwiseAbs()))) continue;
+    PointGrid::Finder finder(grid);
     const auto mark = [&](const Eigen::Vector3f& p) {
-      const std::optional<PointGrid::Place> place = grid.Find(p);
+      const std::optional<PointGrid::Place> place = finder.FindNew(p);
       if (!place) return;
       int& known = densest[place->block][static_cast<std::size_t>(place->code)];
       const bool is_denser =
-          known == kNone ||
-          discs_grid[i].density > discs_grid[static_cast<std::size_t>(known)].density;
+          known == kNone || disc.density > discs_grid[static_cast<std::size_t>(known)].density;
       if (is_denser) known = static_cast<int>(i);
     };
-    ForPlacesOf(discs_grid[i], kEdgeSigmas / extent_factor, finest_m, mark);
+    ForPlacesOf(square, finest_m, [&](const Eigen::Vector3f& p) {
+      mark(p);
+      if (grid.IsWithinCell(p, off.cwiseAbs())) return;
+      mark(p - off);
+      mark(p + off);
+    });
   }
   return densest;
 }

@@ -68,7 +68,7 @@ struct PatchFit {
   std::vector<Patch> patches;
   /// [points of the last scan] whether a new patch, or a disc that stays, passes where they are.
   std::vector<std::uint8_t> covered;
-  std::vector<std::size_t> replaced;  ///< which of the known discs give way to patches
+  std::vector<std::size_t> replaced;  ///< known discs that give way to patches, ascending
 };
 
 /// Sorts the measurements into cells that are aligned with the map, halves cells until each is flat

@@ -55,6 +55,7 @@ Eigen::Matrix3d Moments::Covariance() const {
 struct PointGrid::Sorted {
   struct Point {
     Eigen::Vector3f p_grid;
+    int code = 0;
     int scan = 0;
     float intensity = 0.0f;
   };
@@ -88,7 +89,6 @@ PointGrid::Sorted PointGrid::SortIntoBlocks(std::span<const PosedPoints> scans,
   block_at_ = VoxelHash(std::min(total, kMaxBlocks));
   const auto min_square = static_cast<float>(sensor.MinRange() * sensor.MinRange());
   const auto max_square = static_cast<float>(sensor.MaxRange() * sensor.MaxRange());
-  const auto blocks_per_m = static_cast<float>(1.0 / block_m_);
   std::vector<Sorted::Point> points;
   std::vector<int> block_of;  // -1: left out
   std::vector<std::size_t> size;
@@ -103,10 +103,12 @@ PointGrid::Sorted PointGrid::SortIntoBlocks(std::span<const PosedPoints> scans,
       const Eigen::Vector3f& p = scans[s].points[i];
       const float square = p.squaredNorm();
       const float intensity = scans[s].intensity.empty() ? 0.0f : scans[s].intensity[i];
-      points.push_back({rotation * p + translation, static_cast<int>(s), intensity});
+      const Eigen::Vector3f p_grid = rotation * p + translation;
+      const Eigen::Vector3i finest_cell = FinestCellOf(p_grid);
+      points.push_back({p_grid, CodeOf(finest_cell), static_cast<int>(s), intensity});
       int block = -1;
       if (square >= min_square && square <= max_square) {
-        const Eigen::Vector3i index = CellOf(blocks_per_m * points.back().p_grid);
+        const Eigen::Vector3i index = BlockOf(finest_cell);
         const auto fresh = static_cast<int>(index_of_.size());
         block = index_of_.size() < kMaxBlocks ? block_at_.FindOrInsert(index, fresh)
                                               : block_at_.Find(index);
@@ -130,26 +132,32 @@ PointGrid::Sorted PointGrid::SortIntoBlocks(std::span<const PosedPoints> scans,
   return sorted;
 }
 
-int PointGrid::CodeOf(const Eigen::Vector3f& p_block) const {
-  const auto cells_per_m = static_cast<float>(1.0 / CellSize(levels_));
-  const int last = (1 << levels_) - 1;  // rounding at the faces
-  const Eigen::Vector3i cell = CellOf(cells_per_m * p_block).cwiseMax(0).cwiseMin(last);
-  const Eigen::Array<std::size_t, 3, 1> place = cell.cast<std::size_t>();
-  return kSpread[place.x()] | kSpread[place.y()] << 1 | kSpread[place.z()] << 2;
+Eigen::Vector3i PointGrid::FinestCellOf(const Eigen::Vector3f& p_grid) const {
+  return CellOf(static_cast<float>(1.0 / CellSize(levels_)) * p_grid);
+}
+
+Eigen::Vector3i PointGrid::BlockOf(const Eigen::Vector3i& finest_cell) const {
+  return finest_cell.unaryExpr([this](int coordinate) { return coordinate >> levels_; });
+}
+
+int PointGrid::CodeOf(const Eigen::Vector3i& finest_cell) const {
+  const int last = (1 << levels_) - 1;
+  const auto spread = [&](int axis) {
+    return kSpread[static_cast<std::size_t>(finest_cell[axis] & last)] << axis;
+  };
+  return spread(0) | spread(1) | spread(2);
 }
 
 std::vector<PointCell> PointGrid::CellsOf(const Sorted& sorted, std::size_t block) const {
   const Eigen::Vector3d corner = Corner(block);
-  const Eigen::Vector3f corner_f = corner.cast<float>();
   std::vector<int> slot_of(static_cast<std::size_t>(CellsPerBlock()), -1);
   std::vector<PointCell> cells;
   for (std::size_t i = sorted.begin[block]; i < sorted.begin[block + 1]; ++i) {
     const Sorted::Point& point = sorted.points[i];
-    const int code = CodeOf(point.p_grid - corner_f);
-    int& slot = slot_of[static_cast<std::size_t>(code)];
+    int& slot = slot_of[static_cast<std::size_t>(point.code)];
     if (slot < 0) {
       slot = static_cast<int>(cells.size());
-      cells.push_back({code, {}});
+      cells.push_back({point.code, {}});
     }
     cells[static_cast<std::size_t>(slot)].moments.Add(
         point.p_grid.cast<double>() - corner,
@@ -163,11 +171,41 @@ std::vector<PointCell> PointGrid::CellsOf(const Sorted& sorted, std::size_t bloc
 }
 
 std::optional<PointGrid::Place> PointGrid::Find(const Eigen::Vector3f& p_grid) const {
-  const auto block_m = static_cast<float>(block_m_);
-  const Eigen::Vector3i index = CellOf(p_grid / block_m);
-  const int block = block_at_.Find(index);
-  if (block < 0) return std::nullopt;
-  return Place{static_cast<std::size_t>(block), CodeOf(p_grid - block_m * index.cast<float>())};
+  return Finder(*this).FindNew(p_grid);
+}
+
+bool PointGrid::HoldsAnyIn(const Eigen::AlignedBox3f& box_grid) const {
+  const Eigen::Vector3i first = BlockOf(FinestCellOf(box_grid.min()));
+  const Eigen::Vector3i last = BlockOf(FinestCellOf(box_grid.max()));
+  for (int x = first.x(); x <= last.x(); ++x) {
+    for (int y = first.y(); y <= last.y(); ++y) {
+      for (int z = first.z(); z <= last.z(); ++z) {
+        if (block_at_.Find({x, y, z}) >= 0) return true;
+      }
+    }
+  }
+  return false;
+}
+
+bool PointGrid::IsWithinCell(const Eigen::Vector3f& p_grid, const Eigen::Vector3f& margin_m) const {
+  const auto cells_per_m = static_cast<float>(1.0 / CellSize(levels_));
+  const Eigen::Array3f in_cells = cells_per_m * p_grid.array();
+  const Eigen::Array3f inside = in_cells - CellOf(in_cells).cast<float>().array();
+  const Eigen::Array3f margin = cells_per_m * margin_m.array();
+  return (inside >= margin).all() && (inside + margin < 1.0f).all();
+}
+
+std::optional<PointGrid::Place> PointGrid::Finder::FindNew(const Eigen::Vector3f& p_grid) {
+  const Eigen::Vector3i finest_cell = grid_.FinestCellOf(p_grid);
+  if (finest_cell == finest_cell_) return std::nullopt;
+  finest_cell_ = finest_cell;
+  const Eigen::Vector3i block_index = grid_.BlockOf(finest_cell);
+  if (block_index != block_index_) {
+    block_index_ = block_index;
+    block_ = grid_.block_at_.Find(block_index);
+  }
+  if (block_ < 0) return std::nullopt;
+  return Place{static_cast<std::size_t>(block_), grid_.CodeOf(finest_cell)};
 }
 
 }  // namespace covsplat

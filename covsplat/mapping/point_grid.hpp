@@ -2,9 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 #include "covsplat/core/parallel.hpp"
 #include "covsplat/core/se3.hpp"
@@ -75,10 +78,22 @@ class PointGrid {
   /// Nothing where no block holds measurements. The position has to be finite.
   std::optional<Place> Find(const Eigen::Vector3f& p_grid) const;
 
+  /// Whether any block that a box reaches into holds measurements.
+  bool HoldsAnyIn(const Eigen::AlignedBox3f& box_grid) const;
+
+  /// Whether everything within a margin of a position, axis by axis, is in the same finest cell.
+  bool IsWithinCell(const Eigen::Vector3f& p_grid, const Eigen::Vector3f& margin_m) const;
+
+  /// Finds one position after the other; cheap where they are mostly in the same block.
+  class Finder;
+
  private:
   struct Sorted;
   Sorted SortIntoBlocks(std::span<const PosedPoints> scans, const SensorModel& sensor);
-  int CodeOf(const Eigen::Vector3f& p_block) const;
+  /// Coordinates of finest cells, of the block that holds one, and its code there.
+  Eigen::Vector3i FinestCellOf(const Eigen::Vector3f& p_grid) const;
+  Eigen::Vector3i BlockOf(const Eigen::Vector3i& finest_cell) const;
+  int CodeOf(const Eigen::Vector3i& finest_cell) const;
   std::vector<PointCell> CellsOf(const Sorted& sorted, std::size_t block) const;
 
   SE3 T_grid_map_;
@@ -87,6 +102,21 @@ class PointGrid {
   VoxelHash block_at_{0};
   std::vector<Eigen::Vector3i> index_of_;      ///< [B]
   std::vector<std::vector<PointCell>> cells_;  ///< [B] by code
+};
+
+class PointGrid::Finder {
+ public:
+  explicit Finder(const PointGrid& grid) : grid_(grid) {}
+
+  /// As the grid's Find, but says nothing about a position in the same finest cell as the one
+  /// before.
+  std::optional<Place> FindNew(const Eigen::Vector3f& p_grid);
+
+ private:
+  const PointGrid& grid_;
+  Eigen::Vector3i finest_cell_ = Eigen::Vector3i::Constant(std::numeric_limits<int>::max());
+  Eigen::Vector3i block_index_ = Eigen::Vector3i::Constant(std::numeric_limits<int>::max());
+  int block_ = -1;
 };
 
 }  // namespace covsplat
