@@ -54,6 +54,7 @@ GaussianColumns<float> Cover(std::size_t count) {
   const Eigen::Vector3d side = 2.0 * kHalfHall;
   const Eigen::Vector3d area(side.y() * side.z(), side.x() * side.z(), side.x() * side.y());
   const double scale = 0.6 * std::sqrt(2.0 * area.sum() / static_cast<double>(count));
+  const auto log_scale = Eigen::Vector2f::Constant(static_cast<float>(std::log(scale)));
   GaussianColumns<float> table;
   table.Resize(count);
   Rng rng(1);
@@ -67,17 +68,7 @@ GaussianColumns<float> Cover(std::size_t count) {
     const Eigen::Vector3d tilt(rng.Normal(), rng.Normal(), rng.Normal());
     const Eigen::Vector3d normal = (0.1 * tilt - sign * Eigen::Vector3d::Unit(axis)).normalized();
     const auto q = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), normal);
-    const double values[kParameterCount] = {mean.x(),
-                                            mean.y(),
-                                            mean.z(),
-                                            q.w(),
-                                            q.x(),
-                                            q.y(),
-                                            q.z(),
-                                            std::log(scale),
-                                            std::log(scale),
-                                            1.5};
-    for (int p = 0; p < kParameterCount; ++p) table.Column(p)[i] = static_cast<float>(values[p]);
+    WriteGaussian(table, i, mean.cast<float>(), q.cast<float>(), log_scale, 1.5f);
   }
   return table;
 }
@@ -136,8 +127,8 @@ void Register(const std::string& name, Backend backend) {
 int main(int argc, char** argv) {
   using namespace covsplat;
   Register("cpu", Backend::kCpu);
-  if (const Result<cuda::DeviceInfo> device = cuda::FindDevice()) {
-    benchmark::AddCustomContext("device", device->name);
+  if (const Result<std::string> device = cuda::FindDevice()) {
+    benchmark::AddCustomContext("device", *device);
     Register("cuda", Backend::kCuda);
     benchmark::RegisterBenchmark("BM_DeviceCopy", BM_DeviceCopy)->Iterations(1);
   }

@@ -204,15 +204,12 @@ Codes Encode(const SavedMap& map, std::size_t row) {
 }
 
 void Decode(const Codes& codes, const Eigen::Vector3f& mean, std::size_t row, SavedMap& map) {
-  const Eigen::Quaternionf q = DecodeRotation(codes);
-  for (int axis = 0; axis < 3; ++axis) {
-    map.gaussians.Column(kMeanX + axis)[row] = mean[axis];
-    map.gaussians.Column(kQuatX + axis)[row] = q.vec()[axis];
-  }
-  map.gaussians.Column(kQuatW)[row] = q.w();
-  map.gaussians.Column(kLogScaleU)[row] = DecodeLog(codes[kLnScaleU]);
-  map.gaussians.Column(kLogScaleV)[row] = DecodeLog(codes[kLnScaleV]);
-  map.gaussians.Column(kOpacityLogit)[row] = DecodeLog(codes[kLogit]);
+  WriteGaussian(map.gaussians,
+                row,
+                mean,
+                DecodeRotation(codes),
+                {DecodeLog(codes[kLnScaleU]), DecodeLog(codes[kLnScaleV])},
+                DecodeLog(codes[kLogit]));
   map.confidence[row] =
       static_cast<float>(static_cast<double>(codes[kConfidence]) / kConfidenceSteps);
   const bool has_score = codes[kControlScore] != kUnknown;

@@ -69,7 +69,9 @@ PointGrid::PointGrid(std::span<const PosedPoints> scans,
                      double block_m,
                      int levels,
                      ThreadPool& pool)
-    : block_m_(block_m), levels_(levels) {
+    : block_m_(block_m),
+      levels_(levels),
+      finest_per_m_(static_cast<float>(1.0 / CellSize(levels))) {
   if (scans.empty()) return;
   const Eigen::Vector3d here = scans.back().T_map_sensor.Translation();
   const Eigen::Vector3d corner = (here / block_m).array().round() * block_m;
@@ -133,7 +135,7 @@ PointGrid::Sorted PointGrid::SortIntoBlocks(std::span<const PosedPoints> scans,
 }
 
 Eigen::Vector3i PointGrid::FinestCellOf(const Eigen::Vector3f& p_grid) const {
-  return CellOf(static_cast<float>(1.0 / CellSize(levels_)) * p_grid);
+  return CellOf(finest_per_m_ * p_grid);
 }
 
 Eigen::Vector3i PointGrid::BlockOf(const Eigen::Vector3i& finest_cell) const {
@@ -188,10 +190,9 @@ bool PointGrid::HoldsAnyIn(const Eigen::AlignedBox3f& box_grid) const {
 }
 
 bool PointGrid::IsWithinCell(const Eigen::Vector3f& p_grid, const Eigen::Vector3f& margin_m) const {
-  const auto cells_per_m = static_cast<float>(1.0 / CellSize(levels_));
-  const Eigen::Array3f in_cells = cells_per_m * p_grid.array();
+  const Eigen::Array3f in_cells = finest_per_m_ * p_grid.array();
   const Eigen::Array3f inside = in_cells - CellOf(in_cells).cast<float>().array();
-  const Eigen::Array3f margin = cells_per_m * margin_m.array();
+  const Eigen::Array3f margin = finest_per_m_ * margin_m.array();
   return (inside >= margin).all() && (inside + margin < 1.0f).all();
 }
 

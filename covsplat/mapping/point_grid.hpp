@@ -99,6 +99,7 @@ class PointGrid {
   SE3 T_grid_map_;
   double block_m_;
   int levels_;
+  float finest_per_m_;
   VoxelHash block_at_{0};
   std::vector<Eigen::Vector3i> index_of_;      ///< [B]
   std::vector<std::vector<PointCell>> cells_;  ///< [B] by code

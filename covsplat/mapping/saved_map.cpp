@@ -1,6 +1,5 @@
 #include "covsplat/mapping/saved_map.hpp"
 
-#include <array>
 #include <cmath>
 
 namespace covsplat {
@@ -25,19 +24,12 @@ SavedMap FlattenMap(const GaussianMap& map) {
       const Eigen::Vector3f mean = (T_map_anchor * MeanOf(from, i).cast<double>()).cast<float>();
       const Eigen::Quaternionf q =
           (T_map_anchor.Rotation() * RotationOf(from, i).cast<double>()).normalized().cast<float>();
-      const std::array<float, kParameterCount> values = {mean.x(),
-                                                         mean.y(),
-                                                         mean.z(),
-                                                         q.w(),
-                                                         q.x(),
-                                                         q.y(),
-                                                         q.z(),
-                                                         from.Column(kLogScaleU)[i],
-                                                         from.Column(kLogScaleV)[i],
-                                                         from.Column(kOpacityLogit)[i]};
-      for (int p = 0; p < kParameterCount; ++p) {
-        saved.gaussians.Column(p)[row] = values[static_cast<std::size_t>(p)];
-      }
+      WriteGaussian(saved.gaussians,
+                    row,
+                    mean,
+                    q,
+                    {from.Column(kLogScaleU)[i], from.Column(kLogScaleV)[i]},
+                    from.Column(kOpacityLogit)[i]);
       const float score = map.Signals().control_score[i];
       saved.confidence[row] = map.Signals().confidence[i];
       saved.control_score[row] = std::isnan(score) ? -1.0f : score;
@@ -91,19 +83,7 @@ void SetRow(SavedMap& map,
     q = q * cycle;
     scale = Eigen::Vector3f(scale.y(), scale.z(), scale.x());
   }
-  const std::array<float, kParameterCount> values = {mean.x(),
-                                                     mean.y(),
-                                                     mean.z(),
-                                                     q.w(),
-                                                     q.x(),
-                                                     q.y(),
-                                                     q.z(),
-                                                     scale.x(),
-                                                     scale.y(),
-                                                     opacity_logit};
-  for (int p = 0; p < kParameterCount; ++p) {
-    map.gaussians.Column(p)[row] = values[static_cast<std::size_t>(p)];
-  }
+  WriteGaussian(map.gaussians, row, mean, q, scale.head<2>(), opacity_logit);
 }
 
 }  // namespace covsplat

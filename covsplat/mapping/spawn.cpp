@@ -131,21 +131,6 @@ Eigen::Vector2d InitialScales(const SpawnConfig& config,
   return scales;
 }
 
-void WriteGaussian(GaussianColumns<float>& table,
-                   std::size_t i,
-                   const Eigen::Vector3f& mean,
-                   const Eigen::Matrix3f& axes,
-                   const Eigen::Vector2d& scales,
-                   double opacity) {
-  const Eigen::Quaternionf q = Eigen::Quaternionf(axes).normalized();
-  for (int k = 0; k < 3; ++k) table.Column(kMeanX + k)[i] = mean[k];
-  table.Column(kQuatW)[i] = q.w();
-  for (int k = 0; k < 3; ++k) table.Column(kQuatX + k)[i] = q.vec()[k];
-  table.Column(kLogScaleU)[i] = static_cast<float>(std::log(scales[0]));
-  table.Column(kLogScaleV)[i] = static_cast<float>(std::log(scales[1]));
-  table.Column(kOpacityLogit)[i] = static_cast<float>(std::log(opacity / (1.0 - opacity)));
-}
-
 /// The axes of a surface with the normal turned to face the sensor from `point`.
 Eigen::Matrix3f FacingAxes(const Eigen::Matrix3f& axes, const Eigen::Vector3f& point) {
   Eigen::Matrix3f facing = axes;
@@ -172,7 +157,12 @@ void Append(const Eigen::Vector3f& mean,
   const double u = PhysicalConfidence(range, cosine, config.confidence);
   // Paper eq. 8.
   const double opacity = config.min_opacity + (config.max_opacity - config.min_opacity) * u;
-  WriteGaussian(spawned.gaussians, i, mean, axes, scales, opacity);
+  WriteGaussian(spawned.gaussians,
+                i,
+                mean,
+                Eigen::Quaternionf(axes).normalized(),
+                {static_cast<float>(std::log(scales[0])), static_cast<float>(std::log(scales[1]))},
+                static_cast<float>(std::log(opacity / (1.0 - opacity))));
   spawned.confidence.push_back(static_cast<float>(u));
   spawned.control_score.push_back(control_score);
   spawned.density.push_back(density);

@@ -1,7 +1,6 @@
 #include "covsplat/mesh/surfel_map.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace covsplat {
@@ -17,11 +16,7 @@ void MoveInto(const SE3& T_anchor_map,
   const Eigen::Vector3d moved = T_anchor_map * MeanOf(from, i).cast<double>();
   const Eigen::Quaterniond turned =
       T_anchor_map.Rotation() * RotationOf(from, i).cast<double>().normalized();
-  for (int k = 0; k < 3; ++k) {
-    to.Column(kMeanX + k)[row] = static_cast<float>(moved[k]);
-    to.Column(kQuatX + k)[row] = static_cast<float>(turned.vec()[k]);
-  }
-  to.Column(kQuatW)[row] = static_cast<float>(turned.w());
+  WritePose(to, row, moved.cast<float>(), turned.cast<float>());
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -50,6 +51,31 @@ inline Eigen::Quaternionf RotationOf(const GaussianColumns<float>& gaussians, st
           gaussians.Column(kQuatX)[row],
           gaussians.Column(kQuatY)[row],
           gaussians.Column(kQuatZ)[row]};
+}
+
+template <class S>
+void WritePose(GaussianColumns<S>& gaussians,
+               std::size_t row,
+               const std::type_identity_t<Eigen::Matrix<S, 3, 1>>& mean,
+               const std::type_identity_t<Eigen::Quaternion<S>>& rotation) {
+  for (int k = 0; k < 3; ++k) {
+    gaussians.Column(kMeanX + k)[row] = mean[k];
+    gaussians.Column(kQuatX + k)[row] = rotation.vec()[k];
+  }
+  gaussians.Column(kQuatW)[row] = rotation.w();
+}
+
+template <class S>
+void WriteGaussian(GaussianColumns<S>& gaussians,
+                   std::size_t row,
+                   const std::type_identity_t<Eigen::Matrix<S, 3, 1>>& mean,
+                   const std::type_identity_t<Eigen::Quaternion<S>>& rotation,
+                   const std::type_identity_t<Eigen::Matrix<S, 2, 1>>& log_scale,
+                   std::type_identity_t<S> opacity_logit) {
+  WritePose(gaussians, row, mean, rotation);
+  gaussians.Column(kLogScaleU)[row] = log_scale[0];
+  gaussians.Column(kLogScaleV)[row] = log_scale[1];
+  gaussians.Column(kOpacityLogit)[row] = opacity_logit;
 }
 
 /// Whether it can be drawn: all numbers are finite, and its rotation has a length.

@@ -48,6 +48,11 @@ enum MomentColumn : int {
   kMomentCount
 };
 
+/// Value of a column before the first step.
+constexpr float FreshMoment(int column) {
+  return column == kBeta1Power || column == kBeta2Power ? 1.0f : 0.0f;
+}
+
 /// The rasteriser works on blocks of this many consecutive Gaussians and reads whole blocks.
 inline constexpr std::size_t kBlockSize = 16;
 

@@ -8,9 +8,6 @@
 namespace covsplat {
 namespace {
 
-// Neighbouring pixels are on one surface if their ranges differ by less than this share.
-constexpr float kMaxRelativeStep = 0.1f;
-
 struct Sampler {
   const ViewGeometry<float>& view;
   const TileImages<float>& images;

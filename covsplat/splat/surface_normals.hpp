@@ -6,6 +6,9 @@
 
 namespace covsplat {
 
+/// Neighbouring pixels are on one surface if their ranges differ by less than this share.
+inline constexpr float kMaxRelativeStep = 0.1f;
+
 /// Fills `targets.surface_*` with the normals of the rendered range image, from central differences
 /// of the back-projected pixels, facing the sensor. Where a neighbour is not rendered (opacity
 /// below `min_alpha`) or lies on another surface there is no normal, so that edges and holes do not

@@ -43,6 +43,9 @@ struct AnchorTransform {
   S translation[3];
 };
 
+/// Footprints are this much larger than what they cover, for their motion until the next binning.
+inline constexpr float kFootprintPaddingPx = 0.5f;
+
 /// Tiles [x0, x1] x [y0, y1] that a Gaussian may touch; x beyond the image wraps. Empty: x1 < x0.
 struct TileBox {
   std::int16_t x0 = 0;

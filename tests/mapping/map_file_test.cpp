@@ -46,11 +46,7 @@ SpawnedGaussians GaussianAt(float x, float score) {
   spawned.gaussians.Resize(1);
   const Eigen::Quaternionf q =
       Eigen::Quaternionf::FromTwoVectors(Eigen::Vector3f::UnitZ(), -Eigen::Vector3f::UnitX());
-  const std::array<float, kParameterCount> values = {
-      x, 0.0f, 0.5f, q.w(), q.x(), q.y(), q.z(), std::log(0.2f), std::log(0.1f), 1.5f};
-  for (int p = 0; p < kParameterCount; ++p) {
-    spawned.gaussians.Column(p)[0] = values[static_cast<std::size_t>(p)];
-  }
+  WriteGaussian(spawned.gaussians, 0, {x, 0.0f, 0.5f}, q, {std::log(0.2f), std::log(0.1f)}, 1.5f);
   spawned.confidence = {0.7f};
   spawned.control_score = {score};
   spawned.density = {0.0f};

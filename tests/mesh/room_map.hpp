@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
@@ -45,20 +44,13 @@ inline SurfelMap MapOf(const std::vector<Disc>& discs, std::vector<SE3> keyframe
   map.intensity.assign(discs.size(), 0.0f);
   for (std::size_t i = 0; i < discs.size(); ++i) {
     const auto q = Eigen::Quaterniond::FromTwoVectors(Vector::UnitZ(), discs[i].normal);
-    const double scale = std::log(0.6 * kSpacing);
-    const std::array<double, kParameterCount> row = {discs[i].mean.x(),
-                                                     discs[i].mean.y(),
-                                                     discs[i].mean.z(),
-                                                     q.w(),
-                                                     q.x(),
-                                                     q.y(),
-                                                     q.z(),
-                                                     scale,
-                                                     scale,
-                                                     3.0};
-    for (int p = 0; p < kParameterCount; ++p) {
-      map.gaussians.Column(p)[i] = static_cast<float>(row[static_cast<std::size_t>(p)]);
-    }
+    const auto log_scale = static_cast<float>(std::log(0.6 * kSpacing));
+    WriteGaussian(map.gaussians,
+                  i,
+                  discs[i].mean.cast<float>(),
+                  q.cast<float>(),
+                  {log_scale, log_scale},
+                  3.0f);
   }
   return map;
 }

@@ -183,16 +183,9 @@ TEST(Rasterizer, NothingToSeeIsTransparent) {
 }
 
 TEST(Rasterizer, BrokenGaussiansAreNotDrawn) {
-  GaussianColumns<float> table = RandomGaussians<float>(48, 0.0, 13);
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  table.Column(kMeanX)[3] = nan;
-  table.Column(kQuatW)[7] = nan;
-  table.Column(kOpacityLogit)[9] = nan;
-  table.Column(kLogScaleU)[11] = nan;
-  for (int p = kQuatW; p <= kQuatZ; ++p) table.Column(p)[15] = 0.0f;
   ThreadPool pool(1);
   Rasterizer<float> rasterizer(SmallSensor(), {}, pool);
-  Look(rasterizer, table, SE3());
+  Look(rasterizer, BrokenGaussians(), SE3());
   rasterizer.Render();
   for (const float t : rasterizer.Images().transmittance) {
     EXPECT_GE(t, 0.0f);

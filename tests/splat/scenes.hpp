@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <Eigen/Geometry>
+#include <gtest/gtest.h>
 
 #include "covsplat/core/rng.hpp"
 #include "covsplat/core/sensor_model.hpp"
@@ -32,17 +34,13 @@ void SetGaussian(GaussianColumns<S>& table,
                  double scale_u,
                  double scale_v,
                  double opacity) {
-  const double values[kParameterCount] = {mean.x(),
-                                          mean.y(),
-                                          mean.z(),
-                                          q.w(),
-                                          q.x(),
-                                          q.y(),
-                                          q.z(),
-                                          std::log(scale_u),
-                                          std::log(scale_v),
-                                          std::log(opacity / (1.0 - opacity))};
-  for (int p = 0; p < kParameterCount; ++p) table.Column(p)[i] = static_cast<S>(values[p]);
+  const Eigen::Vector2d log_scale(std::log(scale_u), std::log(scale_v));
+  WriteGaussian(table,
+                i,
+                mean.cast<S>(),
+                q.cast<S>(),
+                log_scale.cast<S>(),
+                static_cast<S>(std::log(opacity / (1.0 - opacity))));
 }
 
 /// Gaussians of random pose and size in front of azimuth `centre_rad`, facing the origin; the
@@ -86,6 +84,18 @@ GaussianColumns<To> Convert(const GaussianColumns<From>& from) {
   return to;
 }
 
+/// As RandomGaussians, but five of them cannot be drawn.
+inline GaussianColumns<float> BrokenGaussians() {
+  GaussianColumns<float> table = RandomGaussians<float>(48, 0.0, 13);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  table.Column(kMeanX)[3] = nan;
+  table.Column(kQuatW)[7] = nan;
+  table.Column(kOpacityLogit)[9] = nan;
+  table.Column(kLogScaleU)[11] = nan;
+  for (int p = kQuatW; p <= kQuatZ; ++p) table.Column(p)[15] = 0.0f;
+  return table;
+}
+
 inline SensorModel RoomSensor() { return UniformSensorModel(32, 256, -0.4, 0.4, 0.5, 30.0); }
 
 /// A room of 10 x 8 m seen from its middle.
@@ -125,6 +135,19 @@ inline GaussianColumns<float> NoisyRoom(const SensorModel& sensor, const RangeMe
     }
   }
   return table;
+}
+
+/// An engine for the room's sensor renders the same from an anchor, wherever that is moved.
+inline void ExpectAMovedAnchorTakesItsGaussiansAlong(SplatEngine& engine) {
+  engine.AddAnchor(SE3());
+  engine.Append(0, NoisyRoom(RoomSensor(), RoomMeasurement(RoomSensor())));
+  const RenderOutput before = engine.Render(SE3());
+  const SE3 moved = SE3::Exp((Vector6d() << 0.3, -0.2, 1.0, 100.0, 50.0, -3.0).finished());
+  engine.SetAnchorPose(0, moved);
+  const RenderOutput after = engine.Render(moved);
+  for (std::size_t i = 0; i < before.range_m.Size(); ++i) {
+    ASSERT_NEAR(before.range_m.Pixels()[i], after.range_m.Pixels()[i], 1e-3f);
+  }
 }
 
 }  // namespace covsplat

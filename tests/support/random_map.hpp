@@ -1,7 +1,6 @@
 // Maps of Gaussians at random, for files that hold maps.
 #pragma once
 
-#include <array>
 #include <cmath>
 
 #include "covsplat/core/rng.hpp"
@@ -15,19 +14,8 @@ inline void SetGaussian(SavedMap& map,
                         const Eigen::Quaternionf& q,
                         const Eigen::Vector2f& scale_m,
                         float opacity_logit) {
-  const std::array<float, kParameterCount> values = {mean.x(),
-                                                     mean.y(),
-                                                     mean.z(),
-                                                     q.w(),
-                                                     q.x(),
-                                                     q.y(),
-                                                     q.z(),
-                                                     std::log(scale_m.x()),
-                                                     std::log(scale_m.y()),
-                                                     opacity_logit};
-  for (int p = 0; p < kParameterCount; ++p) {
-    map.gaussians.Column(p)[row] = values[static_cast<std::size_t>(p)];
-  }
+  WriteGaussian(
+      map.gaussians, row, mean, q, {std::log(scale_m.x()), std::log(scale_m.y())}, opacity_logit);
 }
 
 /// Means within +-`extent_m`, every orientation, scales of 2 cm to 1 m, seven keyframes, a sensor

@@ -12,8 +12,7 @@ namespace {
 
 void ResetMoments(MomentColumns<float>& moments, std::size_t begin, std::size_t end) {
   for (int c = 0; c < kMomentCount; ++c) {
-    const float value = c == kBeta1Power || c == kBeta2Power ? 1.0f : 0.0f;
-    std::fill(moments.Column(c) + begin, moments.Column(c) + end, value);
+    std::fill(moments.Column(c) + begin, moments.Column(c) + end, FreshMoment(c));
   }
 }
 

@@ -60,7 +60,7 @@ TileBox BoxOf(const ViewGeometry<S>& view,
               const SurfelRecord<S>& record,
               const Footprints<S>& f,
               int lane) {
-  constexpr S kPadding = S(0.5);  // motion of the footprint until the next binning
+  constexpr S kPadding = S(kFootprintPaddingPx);
   const S half = f.half_columns[lane] + kPadding;
   const S row0 = f.top_row[lane] - kPadding;
   const S row1 = f.bottom_row[lane] + kPadding;

@@ -8,6 +8,7 @@
 #include "covsplat/splat/cuda/kernels.hpp"
 #include "covsplat/splat/cuda/make_engine.hpp"
 #include "covsplat/splat/gaussian_rows.hpp"
+#include "covsplat/splat/surface_normals.hpp"
 
 namespace covsplat::cuda {
 namespace {
@@ -17,10 +18,7 @@ constexpr int kImagePlanes = 6;  // range, median, opacity and a normal
 /// Adam's memory before the first step, column by column.
 void FillFreshMoments(std::span<float> values, std::size_t rows) {
   for (int c = 0; c < kMomentCount; ++c) {
-    const float value = c == kBeta1Power || c == kBeta2Power ? 1.0f : 0.0f;
-    std::fill_n(values.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(c) * rows),
-                rows,
-                value);
+    std::fill_n(values.data() + static_cast<std::size_t>(c) * rows, rows, FreshMoment(c));
   }
 }
 
@@ -30,9 +28,9 @@ bool IsBuilt() { return true; }
 
 Result<std::unique_ptr<SplatEngine>> MakeEngine(const SensorModel& sensor,
                                                 const EngineConfig& config) {
-  const Result<DeviceInfo> device = FindDevice();
+  const Result<std::string> device = FindDevice();
   if (!device) return Forward(device);
-  return std::make_unique<CudaEngine>(sensor, config, fmt::format("cuda ({})", device->name));
+  return std::make_unique<CudaEngine>(sensor, config, fmt::format("cuda ({})", *device));
 }
 
 CudaEngine::CudaEngine(const SensorModel& sensor, const EngineConfig& config, std::string device)
@@ -327,8 +325,12 @@ void CudaEngine::BeginView(int anchor, bool surface_normals) {
   if (surface_is_on_) {
     RenderTiles(Raster(), Images(), stream_);
     KeepShortLists();
-    FindSurfaceNormals(
-        view_, Images().range_m, views_[index].range.Data(), surface_.Data(), stream_);
+    FindSurfaceNormals(view_,
+                       kMaxRelativeStep,
+                       Images().range_m,
+                       views_[index].range.Data(),
+                       surface_.Data(),
+                       stream_);
   }
   current_view_ = anchor;
   steps_left_ = config_.raster.rebin_interval;

@@ -15,7 +15,7 @@ tl::unexpected<Error> NotBuilt() {
 
 bool IsBuilt() { return false; }
 
-Result<DeviceInfo> FindDevice() { return NotBuilt(); }
+Result<std::string> FindDevice() { return NotBuilt(); }
 
 std::size_t DeviceBytes() { return 0; }
 

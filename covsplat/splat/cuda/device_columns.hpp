@@ -21,7 +21,6 @@ class DeviceColumns {
   void Download(std::span<float> values, cudaStream_t stream) const;
 
   std::size_t Size() const { return size_; }
-  int Columns() const { return columns_; }
   DeviceTable Table() { return {values_.Data(), stride_}; }
 
  private:

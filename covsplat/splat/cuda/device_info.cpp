@@ -29,7 +29,7 @@ void CountDeviceBytes(std::ptrdiff_t bytes) { device_bytes += bytes; }
 
 std::size_t DeviceBytes() { return static_cast<std::size_t>(device_bytes.load()); }
 
-Result<DeviceInfo> FindDevice() {
+Result<std::string> FindDevice() {
   int devices = 0;
   const cudaError_t counted = cudaGetDeviceCount(&devices);
   if (counted != cudaSuccess || devices == 0) {
@@ -42,19 +42,16 @@ Result<DeviceInfo> FindDevice() {
   int device = 0;
   CheckCuda(cudaGetDevice(&device), "asking for the device");
   CheckCuda(cudaGetDeviceProperties(&properties, device), "asking for the device's properties");
-  const std::string capability = fmt::format("{}.{}", properties.major, properties.minor);
   if (const cudaError_t code = CheckKernels(); code != cudaSuccess) {
     static_cast<void>(cudaGetLastError());
     return Fail(ErrorCode::kUnavailable,
-                "the CUDA device {} (compute capability {}) cannot run this build: {}",
+                "the CUDA device {} (compute capability {}.{}) cannot run this build: {}",
                 properties.name,
-                capability,
+                properties.major,
+                properties.minor,
                 cudaGetErrorString(code));
   }
-  return DeviceInfo{properties.name,
-                    capability,
-                    properties.multiProcessorCount,
-                    static_cast<double>(properties.totalGlobalMem)};
+  return std::string(properties.name);
 }
 
 double MeasureCopyBandwidth() {

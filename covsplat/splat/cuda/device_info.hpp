@@ -8,16 +8,9 @@
 
 namespace covsplat::cuda {
 
-struct DeviceInfo {
-  std::string name;
-  std::string capability;  ///< for example "9.0"
-  int multiprocessors = 0;
-  double memory_bytes = 0.0;
-};
-
-/// The device that engines run on. kUnavailable, with the reason, if this build or machine has none
-/// or this build has no code for it.
-Result<DeviceInfo> FindDevice();
+/// Name of the device that engines run on. kUnavailable, with the reason, if this build or machine
+/// has none or this build has no code for it.
+Result<std::string> FindDevice();
 
 /// Device memory that engines of this process hold now.
 std::size_t DeviceBytes();

@@ -35,6 +35,7 @@ void SortPairs(const SceneJob& scene,
 void RenderTiles(const RasterJob& job, const RenderImages& images, cudaStream_t stream);
 /// Normals of a rendering at the pixels that were measured, tile by tile: as FindSurfaceNormals.
 void FindSurfaceNormals(const DeviceView& view,
+                        float max_relative_step,
                         const float* range_m,
                         const std::uint16_t* measured,
                         float* surface,

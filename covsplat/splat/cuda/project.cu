@@ -74,11 +74,10 @@ __device__ int FloorDivide(int value, int divisor) {
 }
 
 __device__ TileBox BoxOf(const DeviceView& view, float column, const Footprint& f) {
-  constexpr float kPadding = 0.5f;  // motion of the footprint until the next binning
   const TileBox nothing{0, -1, 0, -1};
-  const float half = f.half_columns + kPadding;
-  const float row0 = f.top_row - kPadding;
-  const float row1 = f.bottom_row + kPadding;
+  const float half = f.half_columns + kFootprintPaddingPx;
+  const float row0 = f.top_row - kFootprintPaddingPx;
+  const float row1 = f.bottom_row + kFootprintPaddingPx;
   const float rows = static_cast<float>(view.rows);
   if (!(row1 > 0.0f) || !(row0 < rows)) return nothing;
   const int y0 = max(0, static_cast<int>(ceilf(fmaxf(row0, 0.0f) - 0.5f)));

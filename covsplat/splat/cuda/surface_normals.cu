@@ -7,9 +7,6 @@ namespace {
 
 constexpr int kThreads = 128;
 
-// Neighbouring pixels are on one surface if their ranges differ by less than this share.
-constexpr float kMaxRelativeStep = 0.1f;
-
 /// Rendered range of a pixel; 0 where there is none.
 __device__ float RangeAt(const DeviceView& view, const float* range_m, int row, int column) {
   return row < 0 || row >= view.rows ? 0.0f : range_m[row * view.columns + column];
@@ -24,7 +21,8 @@ __device__ float3 PointAt(const DeviceView& view, int row, int column, float ran
           range * view.sin_elevation[y]};
 }
 
-__device__ float3 NormalAt(const DeviceView& view, const float* range_m, int row, int column) {
+__device__ float3 NormalAt(
+    const DeviceView& view, float max_relative_step, const float* range_m, int row, int column) {
   const int left = column == 0 ? view.columns - 1 : column - 1;
   const int right = column + 1 == view.columns ? 0 : column + 1;
   const float centre = RangeAt(view, range_m, row, column);
@@ -34,7 +32,7 @@ __device__ float3 NormalAt(const DeviceView& view, const float* range_m, int row
                            RangeAt(view, range_m, row + 1, column)};
   bool one_surface = centre > 0.0f;
   for (const float range : around) {
-    one_surface = one_surface && fabsf(range - centre) < kMaxRelativeStep * centre;
+    one_surface = one_surface && fabsf(range - centre) < max_relative_step * centre;
   }
   if (!one_surface) return {0.0f, 0.0f, 0.0f};
   const float3 across = PointAt(view, row, right, around[1]) - PointAt(view, row, left, around[0]);
@@ -47,6 +45,7 @@ __device__ float3 NormalAt(const DeviceView& view, const float* range_m, int row
 
 /// One thread per place in the tile-by-tile arrays.
 __global__ void FindSurfaceNormalsKernel(DeviceView view,
+                                         float max_relative_step,
                                          const float* range_m,
                                          const std::uint16_t* measured,
                                          float* surface) {
@@ -58,7 +57,7 @@ __global__ void FindSurfaceNormalsKernel(DeviceView view,
   const int row = kTileSide * (tile / view.tile_columns) + lane / kTileSide;
   const int column = kTileSide * (tile % view.tile_columns) + lane % kTileSide;
   float3 normal{0.0f, 0.0f, 0.0f};
-  if (measured[i] != 0) normal = NormalAt(view, range_m, row, column);
+  if (measured[i] != 0) normal = NormalAt(view, max_relative_step, range_m, row, column);
   surface[i] = normal.x;
   surface[pixels + i] = normal.y;
   surface[2 * pixels + i] = normal.z;
@@ -67,13 +66,14 @@ __global__ void FindSurfaceNormalsKernel(DeviceView view,
 }  // namespace
 
 void FindSurfaceNormals(const DeviceView& view,
+                        float max_relative_step,
                         const float* range_m,
                         const std::uint16_t* measured,
                         float* surface,
                         cudaStream_t stream) {
   const std::size_t pixels = kTilePixels * static_cast<std::size_t>(view.tiles);
   FindSurfaceNormalsKernel<<<CeilDivide(pixels, kThreads), kThreads, 0, stream>>>(
-      view, range_m, measured, surface);
+      view, max_relative_step, range_m, measured, surface);
   CheckLaunch("finding surface normals");
 }
 
