@@ -1,6 +1,7 @@
 #include "covsplat/mapping/keyframe.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "covsplat/mapping/signals.hpp"
@@ -12,6 +13,23 @@ namespace {
 /// So far beyond a place, and so much of its range more, a measurement has seen through it.
 constexpr float kBeyondM = 0.3f;
 constexpr float kBeyondRatio = 0.03f;
+/// Cosine of the flattest incidence at which a surface tells where rays beside the measured one
+/// meet it.
+constexpr float kMinIncidence = 0.1f;
+
+/// Where a pixel's ray meets the surface that was measured in the pixel, but not in its middle. Of
+/// several measurements in a pixel the nearest is left: taken as it is, it would draw slanted
+/// surfaces towards the sensor.
+float RangeAlong(const Eigen::Vector3f& ray,
+                 const Eigen::Vector3f& point,
+                 const Eigen::Vector3f& normal) {
+  const float range_m = point.norm();
+  const float distance_m = normal.dot(point);
+  const float cosine = normal.dot(ray);
+  const bool is_flat =
+      std::abs(cosine) < kMinIncidence || std::abs(distance_m) < kMinIncidence * range_m;
+  return is_flat ? range_m : distance_m / cosine;
+}
 
 }  // namespace
 
@@ -51,6 +69,9 @@ Keyframe MakeKeyframe(TrackedScan tracked,
       const auto& axes = scan.covariance[static_cast<std::size_t>(surface)].axes;
       const Eigen::Vector3f normal = axes.col(2);
       keyframe.measurement.normal.Pixels()[i] = normal.dot(p) < 0.0f ? normal : -normal;
+      const auto pixel = static_cast<int>(i);
+      const Eigen::Vector3f ray = sensor.RayOf(pixel / sensor.Columns(), pixel % sensor.Columns());
+      keyframe.measurement.range_m.Pixels()[i] = RangeAlong(ray, p, normal);
     }
   });
   return keyframe;

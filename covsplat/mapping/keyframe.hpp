@@ -77,7 +77,8 @@ struct KeyframeConfig {
 double Overlap(std::span<const float> squared_distance, double overlap_distance_m);
 
 /// Projects a tracked scan and gives every pixel the surface (and so the normal) of the source
-/// point next to it, if there is one within `max_surface_distance_m`.
+/// point next to it, if there is one within `max_surface_distance_m`. There, ranges are those at
+/// which the pixel's own ray meets the surface.
 Keyframe MakeKeyframe(TrackedScan tracked,
                       const SensorModel& sensor,
                       double max_surface_distance_m,

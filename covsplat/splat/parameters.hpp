@@ -35,7 +35,8 @@ enum Tangent : int {
 };
 
 /// Adam's memory: first moments of the tangent, one second moment per vector, and the powers of
-/// beta1 and beta2 that undo the start from zero (each Gaussian counts its own steps).
+/// beta1 and beta2 that undo the start from zero (each Gaussian counts its own steps). Beside it,
+/// how far the log scales are from where they started.
 enum MomentColumn : int {
   kFirstMoment = 0,
   kSecondMean = kTangentCount,
@@ -45,6 +46,8 @@ enum MomentColumn : int {
   kSecondOpacity,
   kBeta1Power,
   kBeta2Power,
+  kGrowthU,
+  kGrowthV,
   kMomentCount
 };
 

@@ -42,7 +42,7 @@ struct RasterConfig {
     v.Field("depth_ratio",
             c.depth_ratio,
             Range{0.0, 1.0},
-            "rendered range used in the losses: 0 expected, 1 median, between: mixed");
+            "rendered range: 0 expected, 1 median, between: mixed");
     v.Field("rebin_interval",
             c.rebin_interval,
             Range{1, 100},
@@ -52,7 +52,8 @@ struct RasterConfig {
 
 /// Weights of the terms of the mapping loss (paper eqs. 10 to 13).
 struct LossConfig {
-  double opacity = 0.1;
+  double range_cap_m = 0.3;
+  double opacity = 0.03;
   double opacity_epsilon = 1e-2;
   double gicp_normal = 0.05;
   double surface_normal = 0.01;
@@ -62,9 +63,14 @@ struct LossConfig {
   double min_alpha = 0.1;
   double hidden_margin_m = 0.3;
   double hidden_margin_ratio = 0.03;
+  bool through_filter = false;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
+    v.Field("range_cap_m",
+            c.range_cap_m,
+            Range{1e-3, 1e6},
+            "a ray that ends farther than this from the measurement counts no more than this");
     v.Field(
         "opacity", c.opacity, Range{0.0, 100.0}, "lambda_alpha: pixels with a return are opaque");
     v.Field("opacity_epsilon",
@@ -98,6 +104,10 @@ struct LossConfig {
             Range{0.0, 1.0},
             "... plus this share of the range are not changed by it: its ray has not been there, "
             "and what shines through an incomplete surface shall not fade for that");
+    v.Field("through_filter",
+            c.through_filter,
+            "Gaussians also change for rays that meet no more of them than their screen-space "
+            "filter; off: they are smaller than the pixel, their range says little of its middle");
   }
 };
 
@@ -111,6 +121,7 @@ struct OptimizerConfig {
   double beta2 = 0.999;
   double epsilon = 1e-15;
   bool mean_along_normal = true;
+  double max_growth = 1.5;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
@@ -129,6 +140,11 @@ struct OptimizerConfig {
         "mean_along_normal",
         c.mean_along_normal,
         "means move along their normals only: sideways motion of a surfel is hardly observable");
+    v.Field("max_growth",
+            c.max_growth,
+            Range{1.0, 1e6},
+            "a Gaussian becomes no more than so many times as wide as it was spawned: that was "
+            "measured, while rays leave open what is between them");
   }
 };
 

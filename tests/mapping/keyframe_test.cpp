@@ -20,9 +20,13 @@ TEST(Overlap, IsTheShareOfPointsNearerThanTheLimit) {
 
 TEST(Overlap, IsZeroWithoutPoints) { EXPECT_EQ(Overlap({}, 0.3), 0.0); }
 
-TEST(MakeKeyframe, ShowsTheNearestPointOfEveryPixelWithItsRange) {
+TEST(MakeKeyframe, ShowsTheNearestPointOfEveryPixel) {
   ThreadPool pool(2);
-  const Keyframe keyframe = StillKeyframe(Room(), ReducedSensor(), SE3(), kNoise, 1, pool);
+  TrackedScan tracked = TrackedStill(Room(), ReducedSensor(), SE3(), kNoise, 1, pool);
+  tracked.surface.clear();
+  tracked.covariance.clear();
+  tracked.squared_distance.clear();
+  const Keyframe keyframe = MakeKeyframe(tracked, ReducedSensor(), 0.5, pool);
   std::size_t returns = 0;
   for (std::size_t i = 0; i < keyframe.point.Size(); ++i) {
     const int point = keyframe.point.Pixels()[i];
@@ -35,6 +39,50 @@ TEST(MakeKeyframe, ShowsTheNearestPointOfEveryPixelWithItsRange) {
     EXPECT_EQ(range, keyframe.tracked.points[static_cast<std::size_t>(point)].norm());
   }
   EXPECT_GT(returns, keyframe.point.Size() * 9 / 10);  // a closed room
+}
+
+TEST(MakeKeyframe, RangesOnSurfacesAreThoseOfThePixelsRays) {
+  // A slanted wall, measured many times in every pixel.
+  const SensorModel sensor = ReducedSensor();
+  const Eigen::Vector3f normal = Eigen::Vector3f(-1.0f, -0.8f, 0.1f).normalized();
+  constexpr float kDistance = -6.0f;
+  ThreadPool pool(2);
+  TrackedScan tracked;
+  Rng rng(3);
+  for (int i = 0; i < 40000; ++i) {
+    const double azimuth = rng.Uniform(-0.4, 0.6);
+    const double elevation = rng.Uniform(-0.2, 0.2);
+    const Eigen::Vector3f ray = Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
+                                                std::cos(elevation) * std::sin(azimuth),
+                                                std::sin(elevation))
+                                    .cast<float>();
+    tracked.points.push_back(kDistance / normal.dot(ray) * ray);
+  }
+  PointCovariance covariance;
+  covariance.axes.col(2) = normal;
+  covariance.axes.col(0) = normal.unitOrthogonal();
+  covariance.axes.col(1) = normal.cross(covariance.axes.col(0));
+  covariance.sigma_m = {0.2f, 0.2f, 0.001f};
+  for (std::size_t i = 0; i < tracked.points.size(); i += 10) {
+    tracked.surface.push_back(tracked.points[i]);
+    tracked.covariance.push_back(covariance);
+    tracked.squared_distance.push_back(0.0f);
+  }
+  const Keyframe keyframe = MakeKeyframe(tracked, sensor, 0.5, pool);
+  double drawn_nearer_m = 0.0;
+  int count = 0;
+  for (int row = 0; row < sensor.Rows(); ++row) {
+    for (int column = 0; column < sensor.Columns(); ++column) {
+      const int point = keyframe.point(row, column);
+      if (point < 0) continue;
+      const float exact = kDistance / normal.dot(sensor.RayOf(row, column));
+      EXPECT_NEAR(keyframe.measurement.range_m(row, column), exact, 1e-4f * exact);
+      drawn_nearer_m += exact - tracked.points[static_cast<std::size_t>(point)].norm();
+      ++count;
+    }
+  }
+  ASSERT_GT(count, 100);
+  EXPECT_GT(drawn_nearer_m / count, 0.01) << "the nearest measurements would not do";
 }
 
 TEST(MakeKeyframe, GivesEveryPixelItsNearestSurfaceAndANormalThatFacesTheSensor) {

@@ -75,6 +75,7 @@ PixelSums BlendPixel(const SensorModel& sensor,
     pixel.normal += weight * s.normal;
     if (pixel.transmittance > 0.5) pixel.median = depth;
     pixel.transmittance -= weight;
+    pixel.hits.push_back({weight, depth});
   }
   return pixel;
 }

@@ -11,11 +11,18 @@
 
 namespace covsplat {
 
+/// A Gaussian that a ray met.
+struct RayHit {
+  double weight = 0.0;
+  double range = 0.0;
+};
+
 struct PixelSums {
   double transmittance = 1.0;
   double range_sum = 0.0;
   double median = 0.0;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  std::vector<RayHit> hits;  ///< front to back
 };
 
 /// Blends all Gaussians of a table (anchored at `T_sensor_anchor`) along the ray of one pixel.

@@ -277,6 +277,7 @@ constexpr Switch kSwitches[] = {
     {"expected range", [](EngineConfig& c) { c.raster.depth_ratio = 0.0; }},
     {"median range", [](EngineConfig& c) { c.raster.depth_ratio = 1.0; }},
     {"rebin_interval", [](EngineConfig& c) { c.raster.rebin_interval = 1; }},
+    {"range_cap_m", [](EngineConfig& c) { c.loss.range_cap_m = 0.02; }},
     {"opacity", [](EngineConfig& c) { c.loss.opacity = 0.5; }},
     {"opacity_epsilon", [](EngineConfig& c) { c.loss.opacity_epsilon = 0.5; }},
     {"gicp_normal", [](EngineConfig& c) { c.loss.gicp_normal = 0.0; }},
@@ -287,6 +288,8 @@ constexpr Switch kSwitches[] = {
     {"nothing is hidden", [](EngineConfig& c) { c.loss.hidden_margin_m = 1e6; }},
     {"hidden_margin_m", [](EngineConfig& c) { c.loss.hidden_margin_m = 0.0; }},
     {"hidden_margin_ratio", [](EngineConfig& c) { c.loss.hidden_margin_ratio = 1.0; }},
+    {"through_filter", [](EngineConfig& c) { c.loss.through_filter = true; }},
+    {"max_growth", [](EngineConfig& c) { c.optimizer.max_growth = 1.002; }},
     {"mean_along_normal", [](EngineConfig& c) { c.optimizer.mean_along_normal = false; }},
     {"betas", [](EngineConfig& c) { c.optimizer.beta1 = 0.5, c.optimizer.beta2 = 0.9; }},
 };

@@ -1,5 +1,6 @@
 #include "covsplat/splat/engine.hpp"
 
+#include <cmath>
 #include <cstring>
 
 #include "tests/splat/scenes.hpp"
@@ -14,6 +15,7 @@ std::unique_ptr<SplatEngine> MakeEngine(ThreadPool& pool) {
   EngineConfig config;  // far from the truth: larger steps than a map needs that starts on surfaces
   config.optimizer.mean_step_m = 1e-3;
   config.optimizer.rotation_step_rad = 5e-3;
+  config.loss.through_filter = true;  // many discs are no larger than a pixel
   return std::move(MakeSplatEngine(Backend::kCpu, RoomSensor(), config, pool).value());
 }
 
@@ -43,6 +45,32 @@ TEST(SplatEngine, OptimisingExplainsTheMeasurement) {
   EXPECT_LT(last.range_loss, 0.3 * first.range_loss);
   EXPECT_LT(last.opacity_loss, first.opacity_loss);
   EXPECT_LT(MeanRangeError(engine->Render(pose), m), 0.3 * before);
+}
+
+TEST(SplatEngine, GaussiansGrowNoFurtherThanAllowed) {
+  ThreadPool pool(2);
+  EngineConfig config;
+  config.loss.opacity = 5.0;
+  config.optimizer.max_growth = 1.2;
+  const auto engine = MakeSplatEngine(Backend::kCpu, RoomSensor(), config, pool).value();
+  const RangeMeasurement m = RoomMeasurement(RoomSensor());
+  const GaussianColumns<float> start = NoisyRoom(RoomSensor(), m);
+  engine->AddAnchor(SE3());
+  engine->Append(0, start);
+  engine->SetView(0, m);
+  for (int i = 0; i < 100; ++i) engine->Step(0, false);
+  int at_the_limit = 0;
+  int narrower = 0;
+  for (const Parameter scale : {kLogScaleU, kLogScaleV}) {
+    for (std::size_t i = 0; i < start.Size(); ++i) {
+      const float growth = engine->Gaussians().Column(scale)[i] - start.Column(scale)[i];
+      ASSERT_LT(growth, std::log(1.2) + 1e-5) << i;
+      at_the_limit += growth > std::log(1.2) - 1e-5;
+      narrower += growth < 0.0f;
+    }
+  }
+  EXPECT_GT(at_the_limit, 10);
+  EXPECT_GT(narrower, 10);
 }
 
 TEST(SplatEngine, SameBitsForAnyNumberOfThreads) {

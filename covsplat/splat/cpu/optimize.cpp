@@ -236,16 +236,36 @@ HWY_INLINE void StepRotation(const AdamStep<S>& step, const BlockGradient<S>& g)
   StoreMasked(step.active, new_q.z * inverse, column[3]);
 }
 
+/// What Adam takes away from a parameter of one number.
 template <class S>
-HWY_INLINE void StepScalar(const AdamStep<S>& step,
-                           Parameter parameter,
-                           int tangent,
-                           int second,
-                           double rate,
-                           const Pack<S>& gradient) {
+HWY_INLINE Pack<S> ScalarStep(
+    const AdamStep<S>& step, int tangent, int second, double rate, const Pack<S>& gradient) {
   const Pack<S> first = step.First(tangent, gradient);
   const Pack<S> inverse = step.InverseRoot(second, gradient * gradient);
-  Subtract(step, parameter, All(static_cast<S>(rate)) * first * inverse);
+  return All(static_cast<S>(rate)) * first * inverse;
+}
+
+template <class S>
+HWY_INLINE void StepLogScale(const AdamStep<S>& step,
+                             Parameter parameter,
+                             int tangent,
+                             int second,
+                             MomentColumn growth_column,
+                             const Pack<S>& gradient) {
+  const OptimizerConfig& optimizer = *step.job.optimizer;
+  const Pack<S> amount = ScalarStep(step, tangent, second, optimizer.log_scale_step, gradient);
+  S* growth = step.job.moments->Column(growth_column) + step.begin;
+  const Pack<S> before = LoadPack(growth);
+  const Pack<S> after = Min(before - amount, All(static_cast<S>(std::log(optimizer.max_growth))));
+  StoreMasked(step.active, after, growth);
+  Subtract(step, parameter, before - after);
+}
+
+template <class S>
+HWY_INLINE void StepOpacity(const AdamStep<S>& step, const Pack<S>& gradient) {
+  const double rate = step.job.optimizer->opacity_logit_step;
+  Subtract(
+      step, kOpacityLogit, ScalarStep(step, kTangentOpacityLogit, kSecondOpacity, rate, gradient));
 }
 
 /// Gradient of the scale term (paper eq. 13) on the larger of the two log scales.
@@ -267,28 +287,14 @@ HWY_INLINE void OptimizeBlock(const OptimizeJob<S>& job, std::uint32_t number) {
   if (!GradientOf(job, number, gradient)) return;
   const std::size_t begin = job.blocks[number].begin;
   AddScaleTerm(job, begin, gradient);
-  const OptimizerConfig& rates = *job.optimizer;
   const AdamStep<S> step = BeginStep(job, begin, gradient.seen > All(S(0)));
   StepMean(step, gradient);
   StepRotation(step, gradient);
-  StepScalar(step,
-             kLogScaleU,
-             kTangentLogScaleU,
-             kSecondLogScaleU,
-             rates.log_scale_step,
-             gradient.log_scale_u);
-  StepScalar(step,
-             kLogScaleV,
-             kTangentLogScaleV,
-             kSecondLogScaleV,
-             rates.log_scale_step,
-             gradient.log_scale_v);
-  StepScalar(step,
-             kOpacityLogit,
-             kTangentOpacityLogit,
-             kSecondOpacity,
-             rates.opacity_logit_step,
-             gradient.opacity_logit);
+  StepLogScale(
+      step, kLogScaleU, kTangentLogScaleU, kSecondLogScaleU, kGrowthU, gradient.log_scale_u);
+  StepLogScale(
+      step, kLogScaleV, kTangentLogScaleV, kSecondLogScaleV, kGrowthV, gradient.log_scale_v);
+  StepOpacity(step, gradient.opacity_logit);
 }
 
 template <class S>

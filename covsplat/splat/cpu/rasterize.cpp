@@ -222,18 +222,40 @@ HWY_INLINE void StoreTile(const Blend<S>& blend, std::size_t tile, TileImages<S>
   StorePack(blend.normal.z, &images.normal_z[16 * tile]);
 }
 
-/// Gradient of the loss with respect to the blended images.
+/// Gradient of the loss with respect to the blended images and to the sum of errors of range.
 template <class S>
 struct ImageGradient {
   Pack<S> alpha, range_sum, median;
   Pack3<S> normal;
-  Pack<S> hidden_from;  ///< Gaussians from this range on have no gradient
+  Pack<S> error_sum;
+  Pack<S> measured, range_cap;  ///< that errors are taken of
+  Pack<S> hidden_from;          ///< Gaussians from this range on have no gradient
 };
 
 template <class S>
 HWY_INLINE ImageGradient<S> NoGradient() {
   const Pack<S> zero = All(S(0));
-  return {zero, zero, zero, {zero, zero, zero}, All(std::numeric_limits<S>::max())};
+  return {
+      zero, zero, zero, {zero, zero, zero}, zero, zero, zero, All(std::numeric_limits<S>::max())};
+}
+
+/// Sum of w * min(|range - measured|, cap): by how much rays miss the measurement, each of the
+/// Gaussians for itself. The mean of their ranges would also be right where what lies in front
+/// makes up for what lies behind.
+template <class S>
+HWY_INLINE Pack<S> SumOfErrors(const KeptSurfels<S>& kept,
+                               std::size_t count,
+                               const Pack<S>& measured,
+                               const Pack<S>& cap) {
+  Pack<S> transmittance = All(S(1));
+  Pack<S> sum = All(S(0));
+  for (std::size_t i = 0; i < count; ++i) {
+    const Pack<S> weight = LoadPack(&kept.alpha[16 * i]) * transmittance;
+    const Pack<S> range = Abs(LoadPack(&kept.range[16 * i]));
+    sum = MulAdd(weight, Min(Abs(range - measured), cap), sum);
+    transmittance = transmittance - weight;
+  }
+  return sum;
 }
 
 /// 1 - <N / A, target> where the target normal is known; adds to the gradient, returns the loss.
@@ -252,10 +274,15 @@ HWY_INLINE S NormalLoss(const Blend<S>& blend,
   return weight * SumOfLanes(SelectOrZero(known, All(S(1)) - cosine));
 }
 
-/// The pixel-local terms of the mapping loss (paper eqs. 10 to 12) and their gradients.
+/// The pixel-local terms of the mapping loss (paper eqs. 10 to 12, the range of each Gaussian in
+/// place of the rendered one) and their gradients. `count`: of the kept Gaussians.
 template <class S>
-HWY_INLINE LossSums
-PixelLoss(const TileJob<S>& job, std::size_t tile, const Blend<S>& blend, ImageGradient<S>& g) {
+HWY_INLINE LossSums PixelLoss(const TileJob<S>& job,
+                              std::size_t tile,
+                              const Blend<S>& blend,
+                              const KeptSurfels<S>& kept,
+                              std::size_t count,
+                              ImageGradient<S>& g) {
   const LossConfig& loss = *job.loss;
   const TileTargets<S>& targets = *job.targets;
   const Pack<S> zero = All(S(0));
@@ -277,15 +304,11 @@ PixelLoss(const TileJob<S>& job, std::size_t tile, const Blend<S>& blend, ImageG
 
   const auto covered = valid & (alpha > All(static_cast<S>(loss.min_alpha)));
   const Pack<S> inverse_alpha = one / Max(alpha, All(static_cast<S>(loss.min_alpha)));
-  const Pack<S> ratio = All(job.view->depth_ratio);
-  const Pack<S> expected = blend.range_sum * inverse_alpha;
-  const Pack<S> difference = MulAdd(ratio, blend.median - expected, expected) - measured;
-  const Pack<S> g_surface =
-      SelectOrZero(covered, Select(difference > zero, All(per_range), All(-per_range)));
-  const Pack<S> g_expected = (one - ratio) * g_surface;
-  g.range_sum = g_expected * inverse_alpha;
-  g.median = ratio * g_surface;
-  g.alpha = NegMulAdd(g_expected * expected, inverse_alpha, g.alpha);
+  g.measured = measured;
+  g.range_cap = All(static_cast<S>(loss.range_cap_m));
+  const Pack<S> error = SumOfErrors(kept, count, measured, g.range_cap) * inverse_alpha;
+  g.error_sum = SelectOrZero(covered, All(per_range) * inverse_alpha);
+  g.alpha = NegMulAdd(g.error_sum, error, g.alpha);
 
   LossSums sums;
   const Pack3<S> normal{LoadPack(&targets.normal_x[16 * tile]),
@@ -300,7 +323,7 @@ PixelLoss(const TileJob<S>& job, std::size_t tile, const Blend<S>& blend, ImageG
     sums.normal += NormalLoss(blend, covered, inverse_alpha, surface, per_surface, g);
   }
 
-  sums.range = per_range * SumOfLanes(SelectOrZero(covered, Abs(difference)));
+  sums.range = per_range * SumOfLanes(SelectOrZero(covered, error));
   sums.opacity = -per_opacity * SumOfLanes(SelectOrZero(valid, Log(Max(opaque, All(S(1e-20))))));
   return sums;
 }
@@ -375,6 +398,8 @@ HWY_INLINE void BackTile(const TileJob<S>& job,
                          const KeptSurfels<S>& kept,
                          std::size_t count) {
   const Pack<S> zero = All(S(0));
+  // A loss may leave out what only the screen-space filter shows.
+  const bool through_filter = job.loss == nullptr || job.loss->through_filter;
   Pack<S> transmittance = blend.transmittance;
   Pack<S> suffix = zero;
   for (std::size_t i = count; i-- > 0;) {
@@ -391,15 +416,21 @@ HWY_INLINE void BackTile(const TileJob<S>& job,
     transmittance = transmittance * inverse;
     const Pack<S> weight = alpha * transmittance;
     const Pack<S> range = Abs(kept_range);
-    const Pack<S> value = MulAdd(g.range_sum, range, g.alpha) + Dot(g.normal, Broadcast(s.n));
+    const Pack<S> error = range - g.measured;
+    const Pack<S> value =
+        MulAdd(g.error_sum, Min(Abs(error), g.range_cap), MulAdd(g.range_sum, range, g.alpha)) +
+        Dot(g.normal, Broadcast(s.n));
     const Pack<S> gained = weight * value;
-    const auto reached = seen & (range < g.hidden_from);
+    auto reached = seen & (range < g.hidden_from);
+    if (!through_filter) reached = reached & (kept_range > zero);
     const auto below_cap = reached & (alpha < All(job.view->alpha_cap));
     const Pack<S> g_alpha = SelectOrZero(below_cap, NegMulAdd(suffix * inverse, alpha, gained));
     suffix = suffix + gained;
     const auto is_median = seen & Equal(blend.median_entry, All(static_cast<S>(i)));
-    const Pack<S> g_range =
-        SelectOrZero(reached, MulAdd(weight, g.range_sum, SelectOrZero(is_median, g.median)));
+    const Pack<S> g_error =
+        SelectOrZero(Abs(error) < g.range_cap, Select(error > zero, g.error_sum, -g.error_sum));
+    const Pack<S> g_range = SelectOrZero(
+        reached, MulAdd(weight, g.range_sum + g_error, SelectOrZero(is_median, g.median)));
     SurfelGradient(*job.view,
                    rays,
                    s,
@@ -439,7 +470,7 @@ HWY_INLINE LossSums StepAll(const TileJob<S>& job, std::size_t begin, std::size_
     const std::size_t count = BlendTile(job, tile, rays, blend, kept);
     StoreTile(blend, tile, *job.images);
     ImageGradient<S> gradient = NoGradient<S>();
-    if (job.targets != nullptr) sums += PixelLoss(job, tile, blend, gradient);
+    if (job.targets != nullptr) sums += PixelLoss(job, tile, blend, kept, count, gradient);
     if (job.upstream != nullptr) AddUpstream(*job.upstream, tile, gradient);
     BackTile(job, rays, blend, gradient, kept, count);
   }

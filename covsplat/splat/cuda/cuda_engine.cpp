@@ -1,6 +1,7 @@
 #include "covsplat/splat/cuda/cuda_engine.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "covsplat/core/check.hpp"
@@ -167,9 +168,11 @@ LossWeights CudaEngine::WeightsOf(const CompactView& view) const {
           .per_opacity = static_cast<float>(loss.opacity) * per_range,
           .per_normal = static_cast<float>(loss.gicp_normal) * per_normal,
           .per_surface = static_cast<float>(loss.surface_normal) * per_range,
+          .range_cap_m = static_cast<float>(loss.range_cap_m),
           .opacity_epsilon = static_cast<float>(loss.opacity_epsilon),
           .hidden_factor = static_cast<float>(1.0 + loss.hidden_margin_ratio),
-          .hidden_margin_m = static_cast<float>(loss.hidden_margin_m)};
+          .hidden_margin_m = static_cast<float>(loss.hidden_margin_m),
+          .through_filter = loss.through_filter};
 }
 
 void CudaEngine::SetView(int anchor, const RangeMeasurement& measurement) {
@@ -347,6 +350,7 @@ AdamRates CudaEngine::Rates() const {
           .epsilon = static_cast<float>(c.epsilon),
           .scale_weight = static_cast<float>(config_.loss.scale),
           .max_scale_m = static_cast<float>(config_.loss.max_scale_m),
+          .max_log_growth = static_cast<float>(std::log(config_.optimizer.max_growth)),
           .mean_along_normal = c.mean_along_normal};
 }
 

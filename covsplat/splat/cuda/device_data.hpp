@@ -90,8 +90,9 @@ struct DeviceTargets {
 /// The loss's weights, divided by the numbers of pixels that they average over.
 struct LossWeights {
   float per_range, per_opacity, per_normal, per_surface;
-  float opacity_epsilon;
+  float range_cap_m, opacity_epsilon;
   float hidden_factor, hidden_margin_m;  ///< hidden from: factor * measured range + margin
+  bool through_filter;
 };
 
 enum LossTerm : int { kLossRange, kLossOpacity, kLossNormal, kLossTermCount };
@@ -108,7 +109,7 @@ struct StepJob {
 struct AdamRates {
   float mean_step_m, rotation_step_rad, log_scale_step, opacity_logit_step;
   float beta1, beta2, epsilon;
-  float scale_weight, max_scale_m;
+  float scale_weight, max_scale_m, max_log_growth;
   bool mean_along_normal;
 };
 

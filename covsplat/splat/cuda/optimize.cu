@@ -176,10 +176,17 @@ __device__ void StepRotation(const OptimizeJob& job,
   z = new_q.z * inverse;
 }
 
-__device__ void StepScalar(
-    float& parameter, const AdamStep& adam, int tangent, int second, float rate, float gradient) {
+/// What Adam takes away from a parameter of one number.
+__device__ float ScalarStep(
+    const AdamStep& adam, int tangent, int second, float rate, float gradient) {
   const float first = adam.First(tangent, gradient);
-  parameter -= rate * first * adam.InverseRoot(second, gradient * gradient);
+  return rate * first * adam.InverseRoot(second, gradient * gradient);
+}
+
+__device__ void StepLogScale(float& log_scale, float& growth, float max_growth, float amount) {
+  const float before = growth;
+  growth = fminf(before - amount, max_growth);
+  log_scale -= before - growth;
 }
 
 /// Gradient of the scale term (paper eq. 13) on the larger of the two log scales.
@@ -215,24 +222,20 @@ __global__ void __launch_bounds__(kThreads) AdamKernel(OptimizeJob job) {
   const AdamRates& rates = job.rates;
   StepMean(job, adam, row, gradient);
   StepRotation(job, adam, row, gradient);
-  StepScalar(log_scale_u,
-             adam,
-             kTangentLogScaleU,
-             kSecondLogScaleU,
-             rates.log_scale_step,
-             gradient.log_scale_u);
-  StepScalar(log_scale_v,
-             adam,
-             kTangentLogScaleV,
-             kSecondLogScaleV,
-             rates.log_scale_step,
-             gradient.log_scale_v);
-  StepScalar(At(scene.gaussians, kOpacityLogit, row),
-             adam,
-             kTangentOpacityLogit,
-             kSecondOpacity,
-             rates.opacity_logit_step,
-             gradient.opacity_logit);
+  StepLogScale(
+      log_scale_u,
+      At(job.moments, kGrowthU, row),
+      rates.max_log_growth,
+      ScalarStep(
+          adam, kTangentLogScaleU, kSecondLogScaleU, rates.log_scale_step, gradient.log_scale_u));
+  StepLogScale(
+      log_scale_v,
+      At(job.moments, kGrowthV, row),
+      rates.max_log_growth,
+      ScalarStep(
+          adam, kTangentLogScaleV, kSecondLogScaleV, rates.log_scale_step, gradient.log_scale_v));
+  At(scene.gaussians, kOpacityLogit, row) -= ScalarStep(
+      adam, kTangentOpacityLogit, kSecondOpacity, rates.opacity_logit_step, gradient.opacity_logit);
   scene.record[record] = RecordOf(scene.view, LoadSurfel(scene.gaussians, row, T_sensor_anchor));
 }
 

@@ -29,6 +29,7 @@ struct SegmentSums {
   float survival[kSegments][kHalf];       ///< product of 1 - alpha, wherever the ray stops
   float transmittance[kSegments][kHalf];  ///< behind the segment
   float range_sum[kSegments][kHalf];
+  float error_sum[kSegments][kHalf];
   float normal[3][kSegments][kHalf];
   float median[kSegments][kHalf];  ///< negative: no Gaussian here was met with more than half left
   int kept[kSegments];             ///< entries that some pixel sees
@@ -129,27 +130,34 @@ __device__ Meeting Meet(const DeviceView& view, const Place& p, const SurfelReco
   return m;
 }
 
+/// What ranges are compared with.
+struct Measured {
+  float range_m = 0.0f;
+  float cap_m = 0.0f;  ///< of errors
+
+  __device__ float ErrorOf(float range) const { return fminf(fabsf(range - range_m), cap_m); }
+};
+
 /// What a pixel has gathered so far; entries are numbered within the segment.
 struct Blend {
   float transmittance = 1.0f;
   float range_sum = 0.0f;
+  float error_sum = 0.0f;
   float median = -1.0f;
   float3 normal = {0.0f, 0.0f, 0.0f};
-  int median_entry = -1;
   int last_entry = -1;  ///< the last one seen
 };
 
 __device__ void BlendSurfel(const Meeting& m,
                             const SurfelRecord<float>& s,
+                            const Measured& measured,
                             int entry,
                             Blend& blend) {
   const float range = m.on_surface ? m.t : s.range;
-  if (blend.transmittance > 0.5f) {
-    blend.median = range;
-    blend.median_entry = entry;
-  }
+  if (blend.transmittance > 0.5f) blend.median = range;
   const float weight = m.alpha * blend.transmittance;
   blend.range_sum += weight * range;
+  blend.error_sum += weight * measured.ErrorOf(range);
   blend.normal = blend.normal + weight * Vector(s.n);
   blend.transmittance -= weight;
   blend.last_entry = entry;
@@ -172,7 +180,11 @@ __device__ float Survival(const RasterJob& job, const Place& place, Batch& batch
 
 /// Blends a segment from the transmittance in front of it. With drop_unseen the entries that some
 /// pixel sees are copied, in order; returns how many there are.
-__device__ int BlendSegment(const RasterJob& job, const Place& place, Batch& batch, Blend& blend) {
+__device__ int BlendSegment(const RasterJob& job,
+                            const Place& place,
+                            const Measured& measured,
+                            Batch& batch,
+                            Blend& blend) {
   int kept = 0;
   for (int base = 0; base < place.longest; base += kBatch) {
     const bool goes_on = base < place.length && blend.transmittance > job.view.transmittance_min;
@@ -184,7 +196,7 @@ __device__ int BlendSegment(const RasterJob& job, const Place& place, Batch& bat
       const Meeting m = Meet(job.view, place, s);
       const bool seen =
           m.alpha >= job.view.alpha_min && blend.transmittance > job.view.transmittance_min;
-      if (seen) BlendSurfel(m, s, base + i, blend);
+      if (seen) BlendSurfel(m, s, measured, base + i, blend);
       if (!job.drop_unseen) continue;
       const unsigned votes = __ballot_sync(kWholeWarp, seen);
       if (!AnyInHalf(votes, place.half)) continue;
@@ -228,6 +240,7 @@ struct Blended {
 /// Blends a tile with all threads of its block.
 __device__ Blended BlendTile(const RasterJob& job,
                              const Place& place,
+                             const Measured& measured,
                              int tile,
                              std::uint32_t begin,
                              int length,
@@ -240,9 +253,10 @@ __device__ Blended BlendTile(const RasterJob& job,
   Blended result;
   Blend& own = result.own;
   for (int s = 0; s < place.segment; ++s) own.transmittance *= sums.survival[s][lane];
-  const int kept = BlendSegment(job, place, batch, own);
+  const int kept = BlendSegment(job, place, measured, batch, own);
   sums.transmittance[place.segment][lane] = own.transmittance;
   sums.range_sum[place.segment][lane] = own.range_sum;
+  sums.error_sum[place.segment][lane] = own.error_sum;
   sums.normal[0][place.segment][lane] = own.normal.x;
   sums.normal[1][place.segment][lane] = own.normal.y;
   sums.normal[2][place.segment][lane] = own.normal.z;
@@ -259,13 +273,13 @@ __device__ Blended BlendTile(const RasterJob& job,
     // Behind a ray that has stopped, the product goes on but nothing is seen.
     if (in_front > job.view.transmittance_min) all.transmittance = sums.transmittance[s][lane];
     all.range_sum += sums.range_sum[s][lane];
+    all.error_sum += sums.error_sum[s][lane];
     all.normal = all.normal + normal;
     if (sums.median[s][lane] >= 0.0f) all.median = sums.median[s][lane];
     if (s > place.segment) {
       later.transmittance += in_front - sums.transmittance[s][lane];
-      later.range_sum += sums.range_sum[s][lane];
+      later.error_sum += sums.error_sum[s][lane];
       later.normal = later.normal + normal;
-      later.median = fmaxf(later.median, sums.median[s][lane]);
     }
     in_front *= sums.survival[s][lane];
   }
@@ -274,11 +288,10 @@ __device__ Blended BlendTile(const RasterJob& job,
   return result;
 }
 
-/// Gradient of the loss with respect to the blended images.
+/// Gradient of the loss with respect to the blended images and to the sum of errors of range.
 struct ImageGradient {
   float alpha = 0.0f;
-  float range_sum = 0.0f;
-  float median = 0.0f;
+  float error_sum = 0.0f;
   float3 normal = {0.0f, 0.0f, 0.0f};
   float hidden_from = 0.0f;  ///< Gaussians from this range on have no gradient
 };
@@ -298,7 +311,8 @@ __device__ float NormalLoss(
   return weight * (1.0f - cosine);
 }
 
-/// The pixel-local terms of the mapping loss (paper eqs. 10 to 12) and their gradients.
+/// The pixel-local terms of the mapping loss (paper eqs. 10 to 12, the range of each Gaussian in
+/// place of the rendered one) and their gradients.
 __device__ PixelLosses PixelLoss(
     const StepJob& job, std::size_t pixel, float measured, const Blend& blend, ImageGradient& g) {
   PixelLosses losses;
@@ -313,14 +327,10 @@ __device__ PixelLosses PixelLoss(
   if (!(alpha > view.min_alpha)) return losses;
 
   const float inverse_alpha = 1.0f / alpha;
-  const float expected = blend.range_sum * inverse_alpha;
-  const float difference = expected + view.depth_ratio * (blend.median - expected) - measured;
-  const float g_surface = difference > 0.0f ? weights.per_range : -weights.per_range;
-  const float g_expected = (1.0f - view.depth_ratio) * g_surface;
-  g.range_sum = g_expected * inverse_alpha;
-  g.median = view.depth_ratio * g_surface;
-  g.alpha -= g_expected * expected * inverse_alpha;
-  losses.term[kLossRange] = weights.per_range * fabsf(difference);
+  const float error = blend.error_sum * inverse_alpha;
+  g.error_sum = weights.per_range * inverse_alpha;
+  g.alpha -= g.error_sum * error;
+  losses.term[kLossRange] = weights.per_range * error;
 
   const std::int8_t* normal = job.targets.normal + 3 * pixel;
   const float3 target = Normalized({static_cast<float>(normal[0]),
@@ -398,16 +408,16 @@ __device__ void SurfelGradient(const DeviceView& view,
 /// out is found again from the record and from the last entry that it saw.
 __device__ void BackSegment(const StepJob& job,
                             const Place& place,
+                            const Measured& measured,
                             const Blended& blended,
                             const ImageGradient& g,
                             Batch& batch) {
   const DeviceView& view = job.raster.view;
   const Blend& own = blended.own;
   const Blend& later = blended.later;
-  const int median_entry = later.median < 0.0f ? own.median_entry : -1;
   float transmittance = own.transmittance;
   float suffix =
-      g.range_sum * later.range_sum + g.alpha * later.transmittance + Dot(g.normal, later.normal);
+      g.error_sum * later.error_sum + g.alpha * later.transmittance + Dot(g.normal, later.normal);
   for (int base = (place.longest - 1) / kBatch * kBatch; base >= 0; base -= kBatch) {
     if (!__any_sync(kWholeWarp, base <= own.last_entry)) continue;
     LoadBatch(job.raster, place, base, false, batch);
@@ -424,11 +434,13 @@ __device__ void BackSegment(const StepJob& job,
         transmittance *= inverse;
         const float weight = m.alpha * transmittance;
         const float range = m.on_surface ? m.t : s.range;
-        const float gained = weight * (g.range_sum * range + g.alpha + Dot(g.normal, Vector(s.n)));
+        const float error = measured.ErrorOf(range);
+        const float gained = weight * (g.error_sum * error + g.alpha + Dot(g.normal, Vector(s.n)));
         const float g_alpha = m.alpha < view.alpha_cap ? gained - suffix * inverse * m.alpha : 0.0f;
         suffix += gained;
-        const float g_range = weight * g.range_sum + (entry == median_entry ? g.median : 0.0f);
-        if (range < g.hidden_from) {
+        const float g_error = range > measured.range_m ? g.error_sum : -g.error_sum;
+        const float g_range = error < measured.cap_m ? weight * g_error : 0.0f;
+        if (range < g.hidden_from && (m.on_surface || job.weights.through_filter)) {
           SurfelGradient(view, place, s, m, weight, g_alpha, g_range, g, terms);
         }
       }
@@ -454,7 +466,7 @@ __global__ void __launch_bounds__(kThreads) RenderKernel(RasterJob job, RenderIm
   const std::uint32_t begin = job.tile_begin[tile];
   const int length = static_cast<int>(job.tile_end[tile] - begin);
   const Place place = FindPlace(job.view, tile, begin, length);
-  const Blend blend = BlendTile(job, place, tile, begin, length, memory).all;
+  const Blend blend = BlendTile(job, place, Measured(), tile, begin, length, memory).all;
   const int row = static_cast<int>(place.row);
   if (place.segment > 0 || row >= job.view.rows) return;
   const std::size_t pixel =
@@ -481,16 +493,18 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor) StepKernel(Step
   const int lane = static_cast<int>(threadIdx.x) % kHalf;
   const std::size_t pixel =
       kTilePixels * static_cast<std::size_t>(tile) + static_cast<std::size_t>(lane);
-  const float measured = job.targets.range_step_m * static_cast<float>(job.targets.range[pixel]);
+  const Measured measured{job.targets.range_step_m * static_cast<float>(job.targets.range[pixel]),
+                          job.weights.range_cap_m};
   PixelLosses losses;
-  if (__any_sync(kWholeWarp, measured > 0.0f)) {  // both halves of all warps ask the same pixels
+  if (__any_sync(kWholeWarp,
+                 measured.range_m > 0.0f)) {  // both halves of all warps ask the same pixels
     const std::uint32_t begin = job.raster.tile_begin[tile];
     const int length = static_cast<int>(job.raster.tile_end[tile] - begin);
     const Place place = FindPlace(view, tile, begin, length);
-    const Blended blended = BlendTile(job.raster, place, tile, begin, length, memory);
+    const Blended blended = BlendTile(job.raster, place, measured, tile, begin, length, memory);
     ImageGradient gradient;
-    losses = PixelLoss(job, pixel, measured, blended.all, gradient);
-    BackSegment(job, place, blended, gradient, memory.batch[place.segment]);
+    losses = PixelLoss(job, pixel, measured.range_m, blended.all, gradient);
+    BackSegment(job, place, measured, blended, gradient, memory.batch[place.segment]);
   }
   if (threadIdx.x >= kWarpSize) return;
   for (int term = 0; term < kLossTermCount; ++term) {
