@@ -121,7 +121,7 @@ struct OptimizerConfig {
   double beta2 = 0.999;
   double epsilon = 1e-15;
   bool mean_along_normal = true;
-  double max_growth = 1.5;
+  double max_growth = 2.0;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
