@@ -93,10 +93,13 @@ class Scene {
   GradientColumns<double> Gradient(const TileGradients<double>& upstream) {
     Look(table);
     rasterizer.StepUpstream(upstream);
-    GradientColumns<double> gradients;
-    gradients.Resize(table.Size());
-    rasterizer.Collect(table, gradients);
-    return gradients;
+    return Collected();
+  }
+
+  GradientColumns<double> Gradient(const TileTargets<double>& targets, const LossConfig& loss) {
+    Look(table);
+    rasterizer.StepLoss(targets, loss, nullptr);
+    return Collected();
   }
 
   void Look(const GaussianColumns<double>& at) {
@@ -107,6 +110,13 @@ class Scene {
   GaussianColumns<double> table;
 
  private:
+  GradientColumns<double> Collected() {
+    GradientColumns<double> gradients;
+    gradients.Resize(table.Size());
+    rasterizer.Collect(table, gradients);
+    return gradients;
+  }
+
   ThreadPool pool_{1};
 
  public:
@@ -307,9 +317,7 @@ TEST(RasterizerGradient, WholeLoss) {
   loss.through_filter = true;
   const LossSums sums = scene.rasterizer.StepLoss(targets, loss, nullptr);
   EXPECT_NEAR(sums.Total(), LossOf(scene, config, targets, loss), 1e-9);
-  GradientColumns<double> gradients;
-  gradients.Resize(scene.table.Size());
-  scene.rasterizer.Collect(scene.table, gradients);
+  const GradientColumns<double> gradients = scene.Gradient(targets, loss);
   for (int tangent = 0; tangent < kTangentCount; ++tangent) {
     const Comparison c =
         CompareTangent(scene.table, gradients, tangent, [&](const GaussianColumns<double>& at) {
@@ -331,12 +339,7 @@ TEST(RasterizerGradient, AMeasurementChangesNothingBehindIt) {
     LossConfig loss;
     loss.hidden_margin_m = margin_m;
     loss.through_filter = true;
-    scene.Look(scene.table);
-    scene.rasterizer.StepLoss(targets, loss, nullptr);
-    GradientColumns<double> gradients;
-    gradients.Resize(scene.table.Size());
-    scene.rasterizer.Collect(scene.table, gradients);
-    return gradients;
+    return scene.Gradient(targets, loss);
   };
   const LossConfig defaults;
   const GradientColumns<double> all = gradient(1e6);
@@ -376,12 +379,7 @@ TEST(RasterizerGradient, WhatOnlyTheFilterShowsDoesNotLearn) {
   const auto gradient = [&](bool through_filter) {
     LossConfig loss;
     loss.through_filter = through_filter;
-    scene.Look(scene.table);
-    scene.rasterizer.StepLoss(targets, loss, nullptr);
-    GradientColumns<double> gradients;
-    gradients.Resize(scene.table.Size());
-    scene.rasterizer.Collect(scene.table, gradients);
-    return gradients;
+    return scene.Gradient(targets, loss);
   };
   const GradientColumns<double> with = gradient(true);
   const GradientColumns<double> without = gradient(false);

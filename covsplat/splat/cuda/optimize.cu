@@ -183,10 +183,28 @@ __device__ float ScalarStep(
   return rate * first * adam.InverseRoot(second, gradient * gradient);
 }
 
-__device__ void StepLogScale(float& log_scale, float& growth, float max_growth, float amount) {
+__device__ void StepLogScale(const OptimizeJob& job,
+                             const AdamStep& adam,
+                             std::size_t row,
+                             Parameter parameter,
+                             int tangent,
+                             int second,
+                             MomentColumn growth_column,
+                             float gradient) {
+  const float amount = ScalarStep(adam, tangent, second, job.rates.log_scale_step, gradient);
+  float& growth = At(job.moments, growth_column, row);
   const float before = growth;
-  growth = fminf(before - amount, max_growth);
-  log_scale -= before - growth;
+  growth = fminf(before - amount, job.rates.max_log_growth);
+  At(job.scene.gaussians, parameter, row) -= before - growth;
+}
+
+__device__ void StepOpacity(const OptimizeJob& job,
+                            const AdamStep& adam,
+                            std::size_t row,
+                            float gradient) {
+  const float rate = job.rates.opacity_logit_step;
+  At(job.scene.gaussians, kOpacityLogit, row) -=
+      ScalarStep(adam, kTangentOpacityLogit, kSecondOpacity, rate, gradient);
 }
 
 /// Gradient of the scale term (paper eq. 13) on the larger of the two log scales.
@@ -215,27 +233,30 @@ __global__ void __launch_bounds__(kThreads) AdamKernel(OptimizeJob job) {
                                         scene.record[record],
                                         T_sensor_anchor.rotation,
                                         job.slot_sums + kHalf * static_cast<std::size_t>(record));
-  float& log_scale_u = At(scene.gaussians, kLogScaleU, row);
-  float& log_scale_v = At(scene.gaussians, kLogScaleV, row);
-  AddScaleTerm(job.rates, log_scale_u, log_scale_v, gradient);
+  AddScaleTerm(job.rates,
+               At(scene.gaussians, kLogScaleU, row),
+               At(scene.gaussians, kLogScaleV, row),
+               gradient);
   const AdamStep adam(job, row);
-  const AdamRates& rates = job.rates;
   StepMean(job, adam, row, gradient);
   StepRotation(job, adam, row, gradient);
-  StepLogScale(
-      log_scale_u,
-      At(job.moments, kGrowthU, row),
-      rates.max_log_growth,
-      ScalarStep(
-          adam, kTangentLogScaleU, kSecondLogScaleU, rates.log_scale_step, gradient.log_scale_u));
-  StepLogScale(
-      log_scale_v,
-      At(job.moments, kGrowthV, row),
-      rates.max_log_growth,
-      ScalarStep(
-          adam, kTangentLogScaleV, kSecondLogScaleV, rates.log_scale_step, gradient.log_scale_v));
-  At(scene.gaussians, kOpacityLogit, row) -= ScalarStep(
-      adam, kTangentOpacityLogit, kSecondOpacity, rates.opacity_logit_step, gradient.opacity_logit);
+  StepLogScale(job,
+               adam,
+               row,
+               kLogScaleU,
+               kTangentLogScaleU,
+               kSecondLogScaleU,
+               kGrowthU,
+               gradient.log_scale_u);
+  StepLogScale(job,
+               adam,
+               row,
+               kLogScaleV,
+               kTangentLogScaleV,
+               kSecondLogScaleV,
+               kGrowthV,
+               gradient.log_scale_v);
+  StepOpacity(job, adam, row, gradient.opacity_logit);
   scene.record[record] = RecordOf(scene.view, LoadSurfel(scene.gaussians, row, T_sensor_anchor));
 }
 
