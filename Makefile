@@ -1,10 +1,11 @@
 # The short way to everything; CMake presets do the work.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test cuda bench bench-peers oracles check-map format tidy docs clean
+.PHONY: help setup demo test cuda bench bench-peers bench-ablation oracles check-map format tidy docs clean
 
 COVSPLAT_DATA ?= ../shared/data
 THREADS ?= 2
-# Of bench-peers: the simulated worlds, and a regular expression for what of it to run.
+# Of bench-peers: the simulated worlds; of it and of bench-ablation: a regular expression for what to
+# run.
 WORLDS ?= courtyard college street
 ONLY ?=
 
@@ -55,6 +56,11 @@ bench-peers: setup build-release .venv/peers $(addprefix simulate-,$(WORLDS))  #
 	.venv/bin/python bench/peers/run.py --covsplat build/release/apps/covsplat \
 	  $(WORLDS:%=--recording bench_out/%) --no-map street --data $(COVSPLAT_DATA) \
 	  --azimuth-time kitti_raw_0005=0.1033 --threads $(THREADS) --out bench_out \
+	  $(if $(ONLY),--only '$(ONLY)',--update docs/benchmarks.md)
+
+# Runs with the same program and settings are kept: interrupted, it goes on where it was.
+bench-ablation: setup build-release  ## Run the paper's ablations (hours): docs/benchmarks.md
+	python3 bench/ablation/run.py --covsplat build/release/apps/covsplat --out bench_out/ablation \
 	  $(if $(ONLY),--only '$(ONLY)',--update docs/benchmarks.md)
 
 .venv/oracles: tools/oracles/requirements.txt

@@ -10,8 +10,16 @@ namespace covsplat {
 namespace {
 
 /// Of the tracker ("wait": for the mapper), then in lockstep those of the mapper.
-constexpr std::array kStages = {
-    "preprocess", "align", "deskew", "wait", "keyframe", "insert", "optimize", "target"};
+constexpr std::array kStages = {"preprocess",
+                                "align",
+                                "deskew",
+                                "wait",
+                                "keyframe",
+                                "reliability",
+                                "insert",
+                                "manage",
+                                "optimize",
+                                "target"};
 
 std::string Header() {
   std::string line =

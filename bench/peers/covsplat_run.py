@@ -27,7 +27,7 @@ def run_covsplat(
         command += ["-s", "deskew.time_source=azimuth"]
         command += ["-s", f"deskew.scan_period_s={recording.azimuth_period_s}"]
     if not mapping:
-        command += ["-s", "mapping.enabled=false"]
+        command += ["-s", "mapping.feedback.mode=frozen"]
     done = run_program(command)
     return Outcome(
         Trajectory.read_tum(out / "trajectory_tum.txt"),

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 TRACKER = ("preprocess", "align", "deskew", "wait")
-MAPPER = ("keyframe", "insert", "target", "optimize")
+MAPPER = ("keyframe", "reliability", "insert", "manage", "target", "optimize")
 
 
 def markdown(out: Path) -> str:

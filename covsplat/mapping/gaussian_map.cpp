@@ -2,55 +2,30 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace covsplat {
-namespace {
-
-// A Gaussian is seen where its pixel's range agrees with its own to this much.
-constexpr float kSeenToleranceM = 0.1f;
-constexpr float kSeenToleranceRatio = 0.02f;
-
-template <class T>
-void Gather(std::vector<T>& column, const std::vector<std::size_t>& old_row) {
-  std::vector<T> gathered(old_row.size());
-  std::transform(
-      old_row.begin(), old_row.end(), gathered.begin(), [&](std::size_t i) { return column[i]; });
-  column = std::move(gathered);
-}
-
-}  // namespace
-
-void GaussianSignals::Resize(std::size_t size) {
-  confidence.resize(size, 0.0f);
-  control_score.resize(size, std::numeric_limits<float>::quiet_NaN());
-  density.resize(size, 0.0f);
-  intensity.resize(size, 0.0f);
-  last_seen.resize(size, -1);
-  seen_through.resize(size, 0);
-  trackable.resize(size, 0);
-}
-
 int GaussianMap::AddKeyframe(const Keyframe& keyframe, const SpawnedGaussians& spawned) {
   const int number = engine_->AddAnchor(keyframe.tracked.T_map_sensor);
   engine_->SetView(number, keyframe.measurement);
-  if (spawned.gaussians.Size() == 0) return number;
-  const AnchorRange range = engine_->Append(number, spawned.gaussians);
-  signals_.Resize(engine_->Gaussians().Size());
+  SpawnedGaussians seen = spawned;
+  for (GaussianSignals& signals : seen.signals) {
+    signals.last_seen = number;
+    signals.trackable = true;
+  }
+  Append(number, seen);
+  return number;
+}
+
+void GaussianMap::Append(int keyframe, const SpawnedGaussians& fresh) {
+  const std::size_t size = fresh.gaussians.Size();
+  if (size == 0) return;
+  const std::size_t begin = engine_->Append(keyframe, fresh.gaussians).begin;
+  signals_.resize(engine_->Gaussians().Size());
   as_spawned_.Resize(engine_->Gaussians().Size());
   for (int p = 0; p < kParameterCount; ++p) {
-    std::copy_n(
-        spawned.gaussians.Column(p), spawned.gaussians.Size(), as_spawned_.Column(p) + range.begin);
+    std::copy_n(fresh.gaussians.Column(p), size, as_spawned_.Column(p) + begin);
   }
-  for (std::size_t i = range.begin; i < range.end; ++i) {
-    signals_.confidence[i] = spawned.confidence[i - range.begin];
-    signals_.control_score[i] = spawned.control_score[i - range.begin];
-    signals_.density[i] = spawned.density[i - range.begin];
-    signals_.intensity[i] = spawned.intensity[i - range.begin];
-    signals_.last_seen[i] = number;
-    signals_.trackable[i] = 1;
-  }
-  return number;
+  std::ranges::copy(fresh.signals, signals_.begin() + static_cast<std::ptrdiff_t>(begin));
 }
 
 void GaussianMap::MarkSeen(int keyframe_number,
@@ -67,13 +42,11 @@ void GaussianMap::MarkSeen(int keyframe_number,
       const Eigen::Vector3f p = rotation * MeanOf(table, i) + translation;
       const std::optional<Pixel> pixel = sensor.Project(p);
       if (!pixel) continue;
-      const float measured = keyframe.measurement.range_m(pixel->row, pixel->column);
-      const float tolerance = kSeenToleranceM + kSeenToleranceRatio * measured;
-      if (measured > 0.0f && std::abs(measured - p.norm()) < tolerance) {
-        signals_.last_seen[i] = keyframe_number;
-        signals_.seen_through[i] = 0;
-      } else if (SeesThrough(keyframe, *pixel, p.norm())) {
-        ++signals_.seen_through[i];
+      if (Sees(keyframe.measurement.range_m, *pixel, p.norm())) {
+        signals_[i].last_seen = keyframe_number;
+        signals_[i].seen_through = 0;
+      } else if (SeesThrough(keyframe.measurement.range_m, *pixel, p.norm())) {
+        ++signals_[i].seen_through;
       }
     }
   }
@@ -92,15 +65,11 @@ std::size_t GaussianMap::RemoveIf(F&& f) {
   }
   if (removed == 0) return 0;
   const std::vector<std::size_t> old_row = engine_->Keep(keep);
-  Gather(signals_.confidence, old_row);
-  Gather(signals_.control_score, old_row);
-  Gather(signals_.density, old_row);
-  Gather(signals_.intensity, old_row);
-  Gather(signals_.last_seen, old_row);
-  Gather(signals_.seen_through, old_row);
-  Gather(signals_.trackable, old_row);
-  for (std::size_t i = 0; i < old_row.size(); ++i) as_spawned_.MoveRow(old_row[i], i);
-  as_spawned_.Resize(old_row.size());
+  std::vector<GaussianSignals> signals;
+  signals.reserve(old_row.size());
+  for (const std::size_t i : old_row) signals.push_back(signals_[i]);
+  signals_ = std::move(signals);
+  as_spawned_.Gather(old_row);
   return removed;
 }
 
@@ -115,7 +84,7 @@ std::size_t GaussianMap::PruneOpacity(double min_opacity) {
 }
 
 std::size_t GaussianMap::PruneSeenThrough(int keyframes) {
-  return RemoveIf([&](std::size_t i) { return signals_.seen_through[i] >= keyframes; });
+  return RemoveIf([&](std::size_t i) { return signals_[i].seen_through >= keyframes; });
 }
 
 NearGaussians GaussianMap::Near(const SE3& T_map_sensor, double distance_m) const {
@@ -134,10 +103,11 @@ NearGaussians GaussianMap::Near(const SE3& T_map_sensor, double distance_m) cons
       const Disc disc = {mean,
                          std::exp(table.Column(kLogScaleU)[i]) * axes.col(0),
                          std::exp(table.Column(kLogScaleV)[i]) * axes.col(1),
-                         signals_.density[i]};
+                         signals_[i].density};
       if (!disc.u.allFinite() || !disc.v.allFinite()) continue;
       near.discs.push_back(disc);
       near.row.push_back(i);
+      near.keyframe.push_back(range.anchor);
     }
   }
   return near;

@@ -7,23 +7,11 @@
 
 namespace covsplat {
 
-/// Per-Gaussian signals, one row per row of the engine's table.
-struct GaussianSignals {
-  std::vector<float> confidence;        ///< u
-  std::vector<float> control_score;     ///< c, NaN where unknown
-  std::vector<float> density;           ///< measurements per m2 it was made of, 0: of one
-  std::vector<float> intensity;         ///< mean of its measurements, 0 if scans have none
-  std::vector<int> last_seen;           ///< keyframe whose scan last agreed with the Gaussian (k_i)
-  std::vector<int> seen_through;        ///< keyframes since then that measured beyond it
-  std::vector<std::uint8_t> trackable;  ///< m_i
-
-  void Resize(std::size_t size);
-};
-
 /// Some of a map's Gaussians.
 struct NearGaussians {
   std::vector<Disc> discs;
   std::vector<std::size_t> row;  ///< of each, in the engine's table until that changes
+  std::vector<int> keyframe;     ///< in whose frame each is kept
 };
 
 /// One owner, one thread. Keyframes are the engine's anchors, numbered alike.
@@ -31,9 +19,12 @@ class GaussianMap {
  public:
   explicit GaussianMap(std::unique_ptr<SplatEngine> engine) : engine_(std::move(engine)) {}
 
-  /// Adds a keyframe with its new Gaussians and makes its measurement a training view. Returns the
-  /// keyframe's number.
+  /// Adds a keyframe with its new Gaussians, which it has seen and which are trackable, and makes
+  /// its measurement a training view. Returns the keyframe's number.
   int AddKeyframe(const Keyframe& keyframe, const SpawnedGaussians& spawned);
+
+  /// Adds Gaussians, with all their signals, in the frame of a keyframe that the map has.
+  void Append(int keyframe, const SpawnedGaussians& fresh);
 
   /// Updates `last_seen` of all Gaussians that a keyframe's range image shows where they are, and
   /// `seen_through` of those where it shows something beyond.
@@ -58,7 +49,8 @@ class GaussianMap {
 
   SplatEngine& Engine() { return *engine_; }
   const SplatEngine& Engine() const { return *engine_; }
-  const GaussianSignals& Signals() const { return signals_; }
+  /// Row by row of the engine's table.
+  const std::vector<GaussianSignals>& Signals() const { return signals_; }
   /// The surviving Gaussians as they were spawned, row by row: what optimisation started from.
   const GaussianColumns<float>& AsSpawned() const { return as_spawned_; }
 
@@ -67,7 +59,7 @@ class GaussianMap {
   std::size_t RemoveIf(F&& f);
 
   std::unique_ptr<SplatEngine> engine_;
-  GaussianSignals signals_;
+  std::vector<GaussianSignals> signals_;
   GaussianColumns<float> as_spawned_;
 };
 

@@ -13,6 +13,9 @@ namespace {
 /// So far beyond a place, and so much of its range more, a measurement has seen through it.
 constexpr float kBeyondM = 0.3f;
 constexpr float kBeyondRatio = 0.03f;
+/// Where a measurement agrees with a range to this much, it shows what is there.
+constexpr float kSeenToleranceM = 0.1f;
+constexpr float kSeenToleranceRatio = 0.02f;
 /// Cosine of the flattest incidence at which a surface tells where rays beside the measured one
 /// meet it.
 constexpr float kMinIncidence = 0.1f;
@@ -77,16 +80,21 @@ Keyframe MakeKeyframe(TrackedScan tracked,
   return keyframe;
 }
 
-bool SeesThrough(const Keyframe& keyframe, Pixel pixel, float range_m) {
-  const Image<float>& measured = keyframe.measurement.range_m;
+bool Sees(const Image<float>& measured_m, Pixel pixel, float range_m) {
+  const float measured = measured_m(pixel.row, pixel.column);
+  const float tolerance_m = kSeenToleranceM + kSeenToleranceRatio * measured;
+  return measured > 0.0f && std::abs(measured - range_m) < tolerance_m;
+}
+
+bool SeesThrough(const Image<float>& measured_m, Pixel pixel, float range_m) {
   const float beyond_m = kBeyondM + (1.0f + kBeyondRatio) * range_m;
-  const int last_row = std::min(pixel.row + 1, measured.Rows() - 1);
+  const int last_row = std::min(pixel.row + 1, measured_m.Rows() - 1);
   bool measures = false;
   for (int row = std::max(pixel.row - 1, 0); row <= last_row; ++row) {
     for (int k = -1; k <= 1; ++k) {
-      const int column = (pixel.column + k + measured.Columns()) % measured.Columns();
-      if (measured(row, column) <= 0.0f) continue;
-      if (measured(row, column) < beyond_m) return false;
+      const int column = (pixel.column + k + measured_m.Columns()) % measured_m.Columns();
+      if (measured_m(row, column) <= 0.0f) continue;
+      if (measured_m(row, column) < beyond_m) return false;
       measures = true;
     }
   }

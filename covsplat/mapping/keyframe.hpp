@@ -84,8 +84,11 @@ Keyframe MakeKeyframe(TrackedScan tracked,
                       double max_surface_distance_m,
                       ThreadPool& pool);
 
-/// Whether the keyframe measured beyond a place in a pixel's direction, and nothing near it in the
-/// pixels around: what was there has moved on.
-bool SeesThrough(const Keyframe& keyframe, Pixel pixel, float range_m);
+/// Whether a pixel of measured ranges shows what is at a range: within 0.1 m and 2 %.
+bool Sees(const Image<float>& measured_m, Pixel pixel, float range_m);
+
+/// Whether measured ranges are beyond a range in a pixel, and nowhere near it in the pixels around:
+/// there was nothing.
+bool SeesThrough(const Image<float>& measured_m, Pixel pixel, float range_m);
 
 }  // namespace covsplat

@@ -29,13 +29,43 @@ Mapper::Mapper(std::unique_ptr<SplatEngine> engine,
                const SensorModel& sensor,
                const MapperConfig& config,
                ThreadPool& pool)
-    : sensor_(sensor), config_(config), pool_(pool), map_(std::move(engine)) {}
+    : sensor_(sensor),
+      config_(config),
+      pool_(pool),
+      map_(std::move(engine)),
+      free_space_(sensor, config.reliability) {}
 
-void Mapper::Insert(const Keyframe& keyframe) {
+void Mapper::Insert(Keyframe keyframe) {
+  MaskMoved(keyframe);
+  Spawn(keyframe);
+  if (map_.Keyframes() % config_.manage.interval == 0) Manage(keyframe.tracked.T_map_sensor);
+}
+
+void Mapper::MaskMoved(Keyframe& keyframe) {
+  const ScopedTimer timer(times_, "reliability");
+  const std::vector<std::uint8_t> moved =
+      free_space_.FindMoved(keyframe.tracked.surface, keyframe.tracked.T_map_sensor, pool_);
+  free_space_.Remember(keyframe);
+  MaskSurfaces(moved, keyframe);
+}
+
+/// Patches through all scans since the last keyframe, less those of what has moved meanwhile.
+PatchFit Mapper::FindPatches(const Keyframe& keyframe, const NearGaussians& near) const {
+  PatchFit fit = FitPatches(keyframe, near.discs, sensor_, config_.spawn, pool_);
+  std::vector<Eigen::Vector3f> middles;
+  for (const Patch& patch : fit.patches) middles.push_back(patch.mean);
+  const std::vector<std::uint8_t> moved =
+      free_space_.FindMoved(middles, keyframe.tracked.T_map_sensor, pool_);
+  std::size_t i = 0;
+  std::erase_if(fit.patches, [&](const Patch&) { return moved[i++] != 0; });
+  return fit;
+}
+
+void Mapper::Spawn(const Keyframe& keyframe) {
   const ScopedTimer timer(times_, "insert");
   const SE3& T_map_sensor = keyframe.tracked.T_map_sensor;
   const NearGaussians near = map_.Near(T_map_sensor, sensor_.MaxRange());
-  const PatchFit fit = FitPatches(keyframe, near.discs, sensor_, config_.spawn, pool_);
+  const PatchFit fit = FindPatches(keyframe, near);
   std::vector<std::size_t> replaced;
   for (const std::size_t i : fit.replaced) replaced.push_back(near.row[i]);
   map_.Remove(replaced);
@@ -46,12 +76,17 @@ void Mapper::Insert(const Keyframe& keyframe) {
       SpawnGaussians(keyframe, fit, render ? &*render : nullptr, staying, sensor_, config_.spawn);
   const int number = map_.AddKeyframe(keyframe, spawned);
   map_.MarkSeen(number, keyframe, sensor_);
-  map_.PruneSeenThrough(config_.prune_seen_through);
-  if (map_.Keyframes() % config_.prune_interval == 0) map_.PruneOpacity(config_.prune_opacity);
+  map_.PruneSeenThrough(config_.manage.prune_seen_through);
+}
+
+void Mapper::Manage(const SE3& T_map_sensor) {
+  const ScopedTimer timer(times_, "manage");
+  ManageMap(
+      map_, T_map_sensor, sensor_.MaxRange(), config_.spawn.patches.extent_factor, config_.manage);
 }
 
 void Mapper::Visit(int keyframe, int steps) {
-  if (!config_.enabled) return;
+  if (!config_.IsRefined()) return;
   const ScopedTimer timer(times_, "optimize");
   for (int i = 0; i < steps; ++i) {
     const bool surface_normals = steps_ >= config_.engine.loss.surface_normal_start;
@@ -106,7 +141,7 @@ int Mapper::RandomNearKeyframe() {
 
 std::shared_ptr<const RegistrationTarget> Mapper::MakeTarget(const SE3& T_map_sensor) {
   const ScopedTimer timer(times_, "target");
-  return BuildTarget(map_, T_map_sensor, 1.2 * sensor_.MaxRange(), config_.trackable);
+  return BuildTarget(map_, T_map_sensor, 1.2 * sensor_.MaxRange(), config_.feedback);
 }
 
 }  // namespace covsplat

@@ -4,7 +4,9 @@
 
 #include "covsplat/core/rng.hpp"
 #include "covsplat/core/stage_times.hpp"
-#include "covsplat/mapping/trackable.hpp"
+#include "covsplat/mapping/feedback.hpp"
+#include "covsplat/mapping/manage.hpp"
+#include "covsplat/mapping/reliability.hpp"
 
 namespace covsplat {
 
@@ -40,33 +42,23 @@ struct ScheduleConfig {
 };
 
 struct MapperConfig {
-  bool enabled = true;
+  bool IsRefined() const { return feedback.mode != FeedbackMode::kFrozen; }
+
   SpawnConfig spawn;
-  TrackableConfig trackable;
+  FeedbackConfig feedback;
   ScheduleConfig schedule;
   EngineConfig engine;
-  double prune_opacity = 0.05;
-  int prune_seen_through = 2;
-  int prune_interval = 5;
+  ReliabilityConfig reliability;
+  ManageConfig manage;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
-    v.Field("enabled",
-            c.enabled,
-            "optimise the map; off: Gaussians stay as they were spawned (an ablation)");
     v.Section("spawn", c.spawn, "new Gaussians from keyframes");
-    v.Section("trackable", c.trackable, "which Gaussians scans are registered to");
+    v.Section("feedback", c.feedback, "what tracking gets from the map");
     v.Section("schedule", c.schedule, "which views are optimised, and how long");
     v.Section("engine", c.engine, "rendering and optimisation");
-    v.Field("prune_opacity",
-            c.prune_opacity,
-            Range{0.0, 0.9},
-            "Gaussians that have become more transparent than this are removed");
-    v.Field("prune_seen_through",
-            c.prune_seen_through,
-            Range{1, 1000000},
-            "so are Gaussians that so many keyframes in a row have seen through");
-    v.Field("prune_interval", c.prune_interval, Range{1, 100000}, "keyframes between prunings");
+    v.Section("reliability", c.reliability, "what stands still");
+    v.Section("manage", c.manage, "what keeps the map small");
   }
 };
 
@@ -78,7 +70,8 @@ class Mapper {
          ThreadPool& pool);
 
   /// Spawns Gaussians where the map does not explain the keyframe and makes it a training view.
-  void Insert(const Keyframe& keyframe);
+  /// Every few keyframes the map around it is managed.
+  void Insert(Keyframe keyframe);
 
   /// The fixed budget of the newest keyframe: new, near and old views.
   void OptimizeNewest();
@@ -101,6 +94,10 @@ class Mapper {
   StageTimes TakeTimes() { return std::exchange(times_, {}); }
 
  private:
+  void MaskMoved(Keyframe& keyframe);
+  PatchFit FindPatches(const Keyframe& keyframe, const NearGaussians& near) const;
+  void Spawn(const Keyframe& keyframe);
+  void Manage(const SE3& T_map_sensor);
   void Visit(int keyframe, int steps);
   int RandomNearKeyframe();
 
@@ -108,6 +105,7 @@ class Mapper {
   const MapperConfig config_;
   ThreadPool& pool_;
   GaussianMap map_;
+  FreeSpace free_space_;
   Rng rng_{20250711};
   std::int64_t steps_ = 0;
   StageTimes times_;

@@ -30,12 +30,13 @@ SavedMap FlattenMap(const GaussianMap& map) {
                     q,
                     {from.Column(kLogScaleU)[i], from.Column(kLogScaleV)[i]},
                     from.Column(kOpacityLogit)[i]);
-      const float score = map.Signals().control_score[i];
-      saved.confidence[row] = map.Signals().confidence[i];
+      const GaussianSignals& signals = map.Signals()[i];
+      const float score = signals.control_score;
+      saved.confidence[row] = signals.confidence;
       saved.control_score[row] = std::isnan(score) ? -1.0f : score;
-      saved.intensity[row] = map.Signals().intensity[i];
+      saved.intensity[row] = signals.intensity;
       saved.keyframe[row] = range.anchor;
-      saved.last_seen[row] = map.Signals().last_seen[i];
+      saved.last_seen[row] = signals.last_seen;
     }
   }
   return saved;

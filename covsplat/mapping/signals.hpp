@@ -1,6 +1,7 @@
 // What tracking knows about a point beyond its position: confidence and complexity.
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -8,6 +9,18 @@
 #include "covsplat/registration/preprocess.hpp"
 
 namespace covsplat {
+
+/// What the map knows of a Gaussian beside its shape.
+struct GaussianSignals {
+  float confidence = 0.0f;                                        ///< u
+  float control_score = std::numeric_limits<float>::quiet_NaN();  ///< c, NaN where unknown
+  float density = 0.0f;    ///< measurements per m2 it was made of, 0: of one
+  float intensity = 0.0f;  ///< mean of its measurements, 0 if scans have none
+  int last_seen = -1;      ///< keyframe whose scan last agreed with the Gaussian (k_i)
+  int seen_through = 0;    ///< keyframes since then that measured beyond it
+  int splits = 0;          ///< times that it, or what it is a half of, was split
+  bool trackable = false;  ///< m_i
+};
 
 struct ConfidenceConfig {
   double range_m = 50.0;

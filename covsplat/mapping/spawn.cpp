@@ -141,10 +141,18 @@ Eigen::Matrix3f FacingAxes(const Eigen::Matrix3f& axes, const Eigen::Vector3f& p
   return facing;
 }
 
-/// Appends one Gaussian with its signals.
+bool HasFixedScale(SpawnMode mode) {
+  return mode == SpawnMode::kIdentity || mode == SpawnMode::kNoRangeScale;
+}
+
+bool HasFixedOpacity(SpawnMode mode) {
+  return mode == SpawnMode::kIdentity || mode == SpawnMode::kNoOpacity;
+}
+
+/// Appends one Gaussian with its signals, as far as the mode lets it have them.
 void Append(const Eigen::Vector3f& mean,
-            const Eigen::Matrix3f& axes,
-            const Eigen::Vector2d& scales,
+            const Eigen::Matrix3f& measured_axes,
+            const Eigen::Vector2d& measured_scales,
             float control_score,
             float density,
             float intensity,
@@ -152,21 +160,27 @@ void Append(const Eigen::Vector3f& mean,
             SpawnedGaussians& spawned) {
   const std::size_t i = spawned.gaussians.Size();
   spawned.gaussians.Resize(i + 1);
-  const double range = mean.norm();
+  const Eigen::Matrix3f axes = config.mode == SpawnMode::kIdentity
+                                   ? FacingAxes(Eigen::Matrix3f::Identity(), mean)
+                                   : measured_axes;
+  const Eigen::Vector2d scales = HasFixedScale(config.mode)
+                                     ? Eigen::Vector2d::Constant(config.fixed_scale_m)
+                                     : measured_scales;
   const double cosine = std::abs(axes.col(2).dot(mean.normalized()));
-  const double u = PhysicalConfidence(range, cosine, config.confidence);
+  const double u = PhysicalConfidence(mean.norm(), cosine, config.confidence);
   // Paper eq. 8.
-  const double opacity = config.min_opacity + (config.max_opacity - config.min_opacity) * u;
+  const double share = HasFixedOpacity(config.mode) ? 0.5 : u;
+  const double opacity = config.min_opacity + (config.max_opacity - config.min_opacity) * share;
   WriteGaussian(spawned.gaussians,
                 i,
                 mean,
                 Eigen::Quaternionf(axes).normalized(),
                 {static_cast<float>(std::log(scales[0])), static_cast<float>(std::log(scales[1]))},
                 static_cast<float>(std::log(opacity / (1.0 - opacity))));
-  spawned.confidence.push_back(static_cast<float>(u));
-  spawned.control_score.push_back(control_score);
-  spawned.density.push_back(density);
-  spawned.intensity.push_back(intensity);
+  spawned.signals.push_back({.confidence = static_cast<float>(u),
+                             .control_score = control_score,
+                             .density = density,
+                             .intensity = intensity});
 }
 
 /// Control score of the surface that the keyframe shows in a pixel, NaN where it shows none.
@@ -183,7 +197,8 @@ void SpawnFromPatches(const Keyframe& keyframe,
                       SpawnedGaussians& spawned) {
   for (const Patch& patch : patches) {
     const std::optional<Pixel> pixel = sensor.Project(patch.mean);
-    if (pixel && SeesThrough(keyframe, *pixel, patch.mean.norm())) continue;
+    const Image<float>& measured_m = keyframe.measurement.range_m;
+    if (pixel && SeesThrough(measured_m, *pixel, patch.mean.norm())) continue;
     const Eigen::Vector2d scales =
         (config.patches.extent_factor * patch.sigma_m.head<2>().cast<double>())
             .cwiseMax(config.min_scale_m)

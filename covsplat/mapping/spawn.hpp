@@ -22,7 +22,26 @@ struct EnumNames<ScaleRule> {
       {{ScaleRule::kSpacing, "spacing"}, {ScaleRule::kPaper, "paper"}}};
 };
 
+/// What new Gaussians take from tracking (the rows of the paper's table of tracking-to-mapping
+/// transfer).
+enum class SpawnMode {
+  kIdentity,      ///< nothing but positions
+  kNoRangeScale,  ///< orientation and opacity; all of the same size
+  kNoOpacity,     ///< orientation and size; all of the same opacity
+  kFull,          ///< orientation and size from covariances, opacity from the confidence
+};
+
+template <>
+struct EnumNames<SpawnMode> {
+  static constexpr std::array<EnumName<SpawnMode>, 4> kNames{
+      {{SpawnMode::kIdentity, "identity"},
+       {SpawnMode::kNoRangeScale, "no_range_scale"},
+       {SpawnMode::kNoOpacity, "no_opacity"},
+       {SpawnMode::kFull, "full"}}};
+};
+
 struct SpawnConfig {
+  SpawnMode mode = SpawnMode::kFull;
   double voxel_m = 0.3;
   double max_alpha = 0.5;
   double range_tolerance_m = 0.1;
@@ -34,6 +53,7 @@ struct SpawnConfig {
   double kappa = 0.1;
   double min_scale_m = 0.02;
   double max_scale_m = 0.5;
+  double fixed_scale_m = 0.1;
   double min_opacity = 0.4;
   double max_opacity = 0.9;
   PatchConfig patches;
@@ -41,6 +61,7 @@ struct SpawnConfig {
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
+    v.Field("mode", c.mode, "what new Gaussians take from tracking");
     v.Field(
         "voxel_m", c.voxel_m, Range{0.02, 5.0}, "at most one new Gaussian per cube of this size");
     v.Field("max_alpha",
@@ -71,6 +92,10 @@ struct SpawnConfig {
     v.Field("kappa", c.kappa, Range{1e-3, 10.0}, "paper rule: kappa");
     v.Field("min_scale_m", c.min_scale_m, Range{1e-3, 1.0}, "smallest initial scale");
     v.Field("max_scale_m", c.max_scale_m, Range{0.01, 10.0}, "s_max: largest initial scale");
+    v.Field("fixed_scale_m",
+            c.fixed_scale_m,
+            Range{1e-3, 10.0},
+            "scale where all have the same (modes identity and no_range_scale)");
     v.Field("min_opacity", c.min_opacity, Range{0.001, 0.999}, "initial opacity at confidence 0");
     v.Field("max_opacity", c.max_opacity, Range{0.001, 0.999}, "initial opacity at confidence 1");
     v.Section("patches", c.patches, "planes through the scans since the last keyframe");
@@ -81,10 +106,7 @@ struct SpawnConfig {
 /// New Gaussians in the keyframe's frame with the signals that come from tracking.
 struct SpawnedGaussians {
   GaussianColumns<float> gaussians;
-  std::vector<float> confidence;     ///< [N] u
-  std::vector<float> control_score;  ///< [N] c, NaN where unknown
-  std::vector<float> density;        ///< [N] measurements per m2, 0 of single pixels
-  std::vector<float> intensity;      ///< [N] mean of the measurements, 0 if scans have none
+  std::vector<GaussianSignals> signals;  ///< [N]
 };
 
 /// Patches through all scans since the last keyframe where they lie dense enough; nothing if

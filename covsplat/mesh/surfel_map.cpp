@@ -36,20 +36,19 @@ SurfelDisc DiscOf(const SurfelMap& map, std::size_t i) {
 }
 
 std::size_t DropBroken(SurfelMap& map) {
-  std::size_t kept = 0;
+  std::vector<std::size_t> sound;
   for (std::size_t i = 0; i < map.Size(); ++i) {
     if (!IsSound(map.gaussians, i)) continue;
-    map.gaussians.MoveRow(i, kept);
-    map.keyframe[kept] = map.keyframe[i];
-    map.confidence[kept] = map.confidence[i];
-    map.intensity[kept] = map.intensity[i];
-    ++kept;
+    map.keyframe[sound.size()] = map.keyframe[i];
+    map.confidence[sound.size()] = map.confidence[i];
+    map.intensity[sound.size()] = map.intensity[i];
+    sound.push_back(i);
   }
-  const std::size_t dropped = map.Size() - kept;
-  map.gaussians.Resize(kept);
-  map.keyframe.resize(kept);
-  map.confidence.resize(kept);
-  map.intensity.resize(kept);
+  const std::size_t dropped = map.Size() - sound.size();
+  map.gaussians.Gather(sound);
+  map.keyframe.resize(sound.size());
+  map.confidence.resize(sound.size());
+  map.intensity.resize(sound.size());
   return dropped;
 }
 

@@ -20,7 +20,6 @@ struct GicpConfig {
   double rotation_epsilon_rad = 5e-5;
   double translation_epsilon_m = 2e-4;
   double kernel_width = 2.0;
-  bool planar_weight = true;
   double inlier_distance_m = 0.1;
   double degeneracy_ratio = 0.02;
   double hold_ratio = 0.002;
@@ -49,7 +48,6 @@ struct GicpConfig {
             c.kernel_width,
             Range{0.1, 100.0},
             "width of the robust kernel in robust standard deviations of the residual");
-    v.Field("planar_weight", c.planar_weight, "weight matches by planarity (paper eq. 5)");
     v.Field("inlier_distance_m",
             c.inlier_distance_m,
             Range{1e-3, 10.0},

@@ -139,13 +139,11 @@ ScanResiduals::ScanResiduals(const SourceCloud& source,
                              const RegistrationTarget& target,
                              double gate_m,
                              double inlier_distance_m,
-                             bool planar_weight,
                              ThreadPool& pool)
     : source_(source),
       target_(target),
       squared_gate_(static_cast<float>(gate_m * gate_m)),
       inlier_distance_m_(static_cast<float>(inlier_distance_m)),
-      planar_weight_(planar_weight),
       covariance_(source.Size()),
       slot_(source.Size(), -1),
       squared_distance_(source.Size(), kInfinity),
@@ -221,8 +219,7 @@ PhaseMoments ScanResiduals::SumChunk(const Frame& frame, std::size_t begin, std:
     const float square = std::max(e.dot(m_e), 0.0f);
     mahalanobis_[i] = square;
     const double kernel = 1.0f / (1.0f + square * frame.inverse_kernel_scale);
-    const double weight =
-        kernel * surfel.confidence * (planar_weight_ ? surfel.planar_weight : 1.0f);
+    const double weight = kernel * surfel.weight;
     const float plane = surfel.normal.dot(e);
 
     const Eigen::Matrix<double, 27, 1> terms = PackTerms(lever, m, m_e).cast<double>();

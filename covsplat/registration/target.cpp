@@ -14,7 +14,7 @@ std::vector<int> SelectUsable(std::span<const TargetSurfel> surfels) {
     const TargetSurfel& s = surfels[i];
     const float norm = s.rotation.coeffs().squaredNorm();
     const bool finite = s.mean.allFinite() && std::isfinite(norm) && std::isfinite(s.scale0) &&
-                        std::isfinite(s.scale1) && std::isfinite(s.confidence);
+                        std::isfinite(s.scale1) && std::isfinite(s.weight);
     if (finite && norm > 1e-12f) usable.push_back(static_cast<int>(i));
   }
   return usable;
@@ -28,7 +28,7 @@ std::vector<Eigen::Vector3f> Means(std::span<const TargetSurfel> surfels,
   return means;
 }
 
-RegistrationTarget::Record MakeRecord(const TargetSurfel& surfel, float planar_weight) {
+RegistrationTarget::Record MakeRecord(const TargetSurfel& surfel) {
   Eigen::Matrix3f axes = surfel.rotation.normalized().toRotationMatrix();
   float sigma0 = std::abs(surfel.scale0);
   float sigma1 = std::abs(surfel.scale1);
@@ -39,16 +39,7 @@ RegistrationTarget::Record MakeRecord(const TargetSurfel& surfel, float planar_w
   return {.mean = surfel.mean,
           .normal = axes.col(2),
           .covariance = SurfaceCovariance(axes, sigma0, sigma1),
-          .planar_weight = planar_weight,
-          .confidence = std::max(surfel.confidence, 0.0f)};
-}
-
-// Value below which a share of the values lies; reorders them.
-float Percentile(std::vector<float>& values, double share) {
-  const auto nth =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
+          .weight = std::max(surfel.weight, 0.0f)};
 }
 
 }  // namespace
@@ -67,25 +58,6 @@ Eigen::Matrix<float, 6, 1> SurfaceCovariance(const Eigen::Matrix3f& axes,
   return packed;
 }
 
-std::vector<float> PlanarWeights(std::span<const Eigen::Vector2f> scales) {
-  constexpr float kEpsilon = 1e-3f;
-  constexpr float kMaxWeight = 10.0f;
-  std::vector<float> kappa;
-  kappa.reserve(scales.size());
-  for (const Eigen::Vector2f& s : scales) {
-    kappa.push_back(s.cwiseAbs().maxCoeff() / (s.cwiseAbs().minCoeff() + kEpsilon));
-  }
-  if (kappa.empty()) return kappa;
-  std::vector<float> sorted = kappa;
-  const float low = Percentile(sorted, 0.05);
-  const float span = Percentile(sorted, 0.95) - low;
-  for (float& value : kappa) {
-    const float normalised = span > kEpsilon ? std::clamp((value - low) / span, 0.0f, 1.0f) : 0.0f;
-    value = std::min(1.0f / (normalised + kEpsilon), kMaxWeight);
-  }
-  return kappa;
-}
-
 RegistrationTarget::RegistrationTarget(std::span<const TargetSurfel> surfels,
                                        const Eigen::Vector3d& origin_map,
                                        int keyframes,
@@ -100,19 +72,12 @@ RegistrationTarget::RegistrationTarget(std::span<const TargetSurfel> surfels,
     : origin_map_(origin_map),
       keyframes_(keyframes),
       index_(Means(surfels, usable), static_cast<float>(cell_m)) {
-  std::vector<Eigen::Vector2f> scales;
-  scales.reserve(usable.size());
-  for (const int i : usable) {
-    const TargetSurfel& surfel = surfels[static_cast<std::size_t>(i)];
-    scales.emplace_back(surfel.scale0, surfel.scale1);
-  }
-  const std::vector<float> weights = PlanarWeights(scales);
   surfel_.reserve(usable.size());
   records_.reserve(usable.size());
   for (std::size_t slot = 0; slot < usable.size(); ++slot) {
     const auto k = static_cast<std::size_t>(index_.IndexOf(static_cast<int>(slot)));
     surfel_.push_back(usable[k]);
-    records_.push_back(MakeRecord(surfels[static_cast<std::size_t>(usable[k])], weights[k]));
+    records_.push_back(MakeRecord(surfels[static_cast<std::size_t>(usable[k])]));
   }
 }
 

@@ -17,9 +17,9 @@ struct TargetSurfel {
   Eigen::Vector3f mean = Eigen::Vector3f::Zero();  ///< map frame, relative to the target's origin
   /// R_map_surfel; its third axis is the normal. Need not be normalised.
   Eigen::Quaternionf rotation = Eigen::Quaternionf::Identity();
-  float scale0 = 1.0f;      ///< standard deviation along the first axis, m
-  float scale1 = 1.0f;      ///< along the second; the order of the two does not matter
-  float confidence = 1.0f;  ///< factor on the matching weight
+  float scale0 = 1.0f;  ///< standard deviation along the first axis, m
+  float scale1 = 1.0f;  ///< along the second; the order of the two does not matter
+  float weight = 1.0f;  ///< of matches; only the ratio to that of others matters
 };
 
 /// Immutable once built, so one target may serve several threads. Positions are float relative to
@@ -32,8 +32,7 @@ class RegistrationTarget {
     Eigen::Vector3f mean;
     Eigen::Vector3f normal;
     Eigen::Matrix<float, 6, 1> covariance;  ///< xx xy xz yy yz zz, middle eigenvalue 1
-    float planar_weight;                    ///< paper eq. 5
-    float confidence;
+    float weight;
   };
 
   RegistrationTarget() : RegistrationTarget({}, Eigen::Vector3d::Zero(), 0) {}
@@ -72,10 +71,5 @@ class RegistrationTarget {
 Eigen::Matrix<float, 6, 1> SurfaceCovariance(const Eigen::Matrix3f& axes,
                                              float sigma0,
                                              float sigma1);
-
-/// Weights of paper eqs. 2, 3 and 5 from in-plane scales `[N x 2]` in any order: 10 for round
-/// surfels down to 1 for the most elongated. Curvature is normalised between its 5th and 95th
-/// percentile, so a single needle does not make all others look planar.
-std::vector<float> PlanarWeights(std::span<const Eigen::Vector2f> scales);
 
 }  // namespace covsplat

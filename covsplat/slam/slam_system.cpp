@@ -137,9 +137,8 @@ void SlamSystem::MapKeyframe(TrackedScan tracked, StageTimes& times) {
   {
     const ScopedTimer timer(times, "keyframe");
     T_map_newest_ = tracked.T_map_sensor;
-    const Keyframe keyframe = MakeKeyframe(
-        std::move(tracked), sensor_, config_.system.max_surface_distance_m, *map_pool_);
-    mapper_.Insert(keyframe);
+    mapper_.Insert(MakeKeyframe(
+        std::move(tracked), sensor_, config_.system.max_surface_distance_m, *map_pool_));
   }
   if (config_.system.schedule == Schedule::kThreaded) PublishTarget();
   if (keyframes_.Empty()) {  // as always in lockstep
@@ -160,9 +159,9 @@ void SlamSystem::PublishTarget() {
 void SlamSystem::MapperLoop() {
   int idle_visits = 0;
   while (true) {
-    std::optional<TrackedScan> keyframe = config_.mapper.enabled && mapper_.Map().Keyframes() > 0
-                                              ? keyframes_.TryPop()
-                                              : keyframes_.Pop();
+    std::optional<TrackedScan> keyframe =
+        config_.mapper.IsRefined() && mapper_.Map().Keyframes() > 0 ? keyframes_.TryPop()
+                                                                    : keyframes_.Pop();
     if (keyframe) {
       MapKeyframe(std::move(*keyframe), mapper_times_);
       continue;

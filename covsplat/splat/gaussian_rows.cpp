@@ -30,16 +30,21 @@ void MakeInert(GaussianColumns<float>& table, std::size_t begin, std::size_t end
 }
 
 KeptRows KeepRows(std::span<const AnchorRange> ranges, std::span<const std::uint8_t> keep) {
+  std::vector<AnchorRange> by_anchor(ranges.begin(), ranges.end());
+  std::ranges::stable_sort(by_anchor, {}, &AnchorRange::anchor);
   KeptRows kept;
-  for (const AnchorRange& range : ranges) {
-    AnchorRange now{range.anchor, kept.old_row.size(), 0};
-    for (std::size_t i = range.begin; i < range.end; ++i) {
-      if (keep[i] != 0) kept.old_row.push_back(i);
+  std::vector<std::size_t>& rows = kept.old_row;
+  for (auto range = by_anchor.begin(); range != by_anchor.end();) {
+    AnchorRange now{range->anchor, rows.size(), 0};
+    for (; range != by_anchor.end() && range->anchor == now.anchor; ++range) {
+      for (std::size_t i = range->begin; i < range->end; ++i) {
+        if (keep[i] != 0) rows.push_back(i);
+      }
     }
-    now.end = kept.old_row.size();
+    now.end = rows.size();
     if (now.end == now.begin) continue;
     kept.ranges.push_back(now);
-    kept.old_row.resize(RoundUpToBlock(now.end), range.begin);
+    rows.resize(RoundUpToBlock(now.end), rows[now.begin]);
   }
   return kept;
 }

@@ -18,21 +18,13 @@ inline std::size_t RoundUpToBlock(std::size_t rows) {
 /// Harmless values for padding rows and for rows that are about to be written.
 void MakeInert(GaussianColumns<float>& table, std::size_t begin, std::size_t end);
 
-/// What remains of a table, in order: new ranges, and for each new row its old row, which is never
-/// less. Padding rows point to a row of their range.
+/// What remains of a table: new ranges, one for each anchor that has Gaussians, ascending, and for
+/// each new row its old row. Rows of an anchor keep their order; padding rows point to one of them.
 struct KeptRows {
   std::vector<AnchorRange> ranges;
   std::vector<std::size_t> old_row;
 };
 KeptRows KeepRows(std::span<const AnchorRange> ranges, std::span<const std::uint8_t> keep);
-
-/// Moves the kept rows of a host table to their new places; the size stays.
-template <int kColumns>
-void MoveRows(const KeptRows& kept, ColumnTable<float, kColumns>& table) {
-  for (const AnchorRange& range : kept.ranges) {
-    for (std::size_t i = range.begin; i < range.end; ++i) table.MoveRow(kept.old_row[i], i);
-  }
-}
 
 /// The Gaussians that a view has to look at. Anchors out of reach of the sensor are left out: a
 /// Gaussian is at most the sensor's range from its anchor, and the far limit holds at the view.

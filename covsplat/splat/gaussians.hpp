@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -27,9 +29,14 @@ class ColumnTable {
   S* Column(int column) { return columns_[static_cast<std::size_t>(column)].data(); }
   const S* Column(int column) const { return columns_[static_cast<std::size_t>(column)].data(); }
 
-  /// Moves row `from` to row `to`.
-  void MoveRow(std::size_t from, std::size_t to) {
-    for (auto& column : columns_) column[to] = column[from];
+  /// Row i becomes what row old_row[i] was.
+  void Gather(std::span<const std::size_t> old_row) {
+    for (auto& column : columns_) {
+      std::vector<S> gathered(old_row.size() + kBlockSize);
+      for (std::size_t i = 0; i < old_row.size(); ++i) gathered[i] = column[old_row[i]];
+      column = std::move(gathered);
+    }
+    size_ = old_row.size();
   }
 
  private:

@@ -31,10 +31,10 @@ SpawnedGaussians Tagged(int first, int count) {
                 0.1,
                 0.1,
                 opacity);
-    spawned.confidence.push_back(1e-3f * static_cast<float>(tag));
-    spawned.control_score.push_back(static_cast<float>(-tag));
-    spawned.density.push_back(2.0f * static_cast<float>(tag));
-    spawned.intensity.push_back(3.0f * static_cast<float>(tag));
+    spawned.signals.push_back({.confidence = 1e-3f * static_cast<float>(tag),
+                               .control_score = static_cast<float>(-tag),
+                               .density = 2.0f * static_cast<float>(tag),
+                               .intensity = 3.0f * static_cast<float>(tag)});
   }
   return spawned;
 }
@@ -46,10 +46,7 @@ SpawnedGaussians GaussiansAt(const std::vector<Eigen::Vector3d>& places) {
   for (std::size_t i = 0; i < places.size(); ++i) {
     SetGaussian(spawned.gaussians, i, places[i], Eigen::Quaterniond::Identity(), 0.1, 0.1, kOpaque);
   }
-  spawned.confidence.assign(places.size(), 1.0f);
-  spawned.control_score.assign(places.size(), 0.0f);
-  spawned.density.assign(places.size(), 0.0f);
-  spawned.intensity.assign(places.size(), 0.0f);
+  spawned.signals.assign(places.size(), {.confidence = 1.0f, .control_score = 0.0f});
   return spawned;
 }
 
@@ -74,22 +71,23 @@ class GaussianMapTest : public ::testing::Test {
     for (const AnchorRange& range : map_.Engine().Ranges()) {
       for (std::size_t i = range.begin; i < range.end; ++i) {
         const float tag = map_.Engine().Gaussians().Column(kMeanX)[i];
-        EXPECT_EQ(map_.Signals().confidence[i], 1e-3f * tag);
-        EXPECT_EQ(map_.Signals().control_score[i], -tag);
-        EXPECT_EQ(map_.Signals().density[i], 2.0f * tag);
-        EXPECT_EQ(map_.Signals().intensity[i], 3.0f * tag);
-        EXPECT_EQ(map_.Signals().last_seen[i], range.anchor);
-        EXPECT_EQ(map_.Signals().trackable[i], 1);
+        const GaussianSignals& signals = map_.Signals()[i];
+        EXPECT_EQ(signals.confidence, 1e-3f * tag);
+        EXPECT_EQ(signals.control_score, -tag);
+        EXPECT_EQ(signals.density, 2.0f * tag);
+        EXPECT_EQ(signals.intensity, 3.0f * tag);
+        EXPECT_EQ(signals.last_seen, range.anchor);
+        EXPECT_TRUE(signals.trackable);
         for (int p = 0; p < kParameterCount; ++p) {
           EXPECT_EQ(map_.AsSpawned().Column(p)[i], map_.Engine().Gaussians().Column(p)[i]);
         }
       }
     }
     EXPECT_EQ(map_.AsSpawned().Size(), map_.Engine().Gaussians().Size());
-    EXPECT_EQ(map_.Signals().confidence.size(), map_.Engine().Gaussians().Size());
+    EXPECT_EQ(map_.Signals().size(), map_.Engine().Gaussians().Size());
   }
 
-  int LastSeen(std::size_t row) const { return map_.Signals().last_seen[row]; }
+  int LastSeen(std::size_t row) const { return map_.Signals()[row].last_seen; }
 
   ThreadPool pool_{2};
   const SensorModel sensor_ = ReducedSensor();
@@ -116,7 +114,7 @@ TEST_F(GaussianMapTest, KeepsSignalsWithTheirGaussiansThroughAddingAndPruning) {
 TEST_F(GaussianMapTest, MarksPaddingAsNotTrackable) {
   Add(1, 5);
   ASSERT_EQ(map_.Engine().Gaussians().Size(), kBlockSize);
-  for (std::size_t i = 5; i < kBlockSize; ++i) EXPECT_EQ(map_.Signals().trackable[i], 0);
+  for (std::size_t i = 5; i < kBlockSize; ++i) EXPECT_FALSE(map_.Signals()[i].trackable);
 }
 
 TEST_F(GaussianMapTest, KeepsAKeyframeThatSpawnsNothingOrLosesAllItsGaussians) {

@@ -47,10 +47,7 @@ SpawnedGaussians GaussianAt(float x, float score) {
   const Eigen::Quaternionf q =
       Eigen::Quaternionf::FromTwoVectors(Eigen::Vector3f::UnitZ(), -Eigen::Vector3f::UnitX());
   WriteGaussian(spawned.gaussians, 0, {x, 0.0f, 0.5f}, q, {std::log(0.2f), std::log(0.1f)}, 1.5f);
-  spawned.confidence = {0.7f};
-  spawned.control_score = {score};
-  spawned.density = {0.0f};
-  spawned.intensity = {30.0f + x};
+  spawned.signals = {{.confidence = 0.7f, .control_score = score, .intensity = 30.0f + x}};
   return spawned;
 }
 

@@ -16,7 +16,7 @@ SE3 PoseOfKeyframe(int k) { return MakePose(0.0, 0.0, 0.3 * k, 0.8 * k - 2.0, 0.
 
 MapperConfig Frozen() {
   MapperConfig config;
-  config.enabled = false;
+  config.feedback.mode = FeedbackMode::kFrozen;
   return config;
 }
 
@@ -57,7 +57,7 @@ TEST_F(MapperTest, OptimisingMakesTheMapBetterWhereItWasNotMeasured) {
   EXPECT_LT(after, 0.15);          // rooms of 24 m x 18 m, 2 cm of noise
 }
 
-TEST_F(MapperTest, LeavesGaussiansAloneWhenItIsDisabled) {
+TEST_F(MapperTest, LeavesGaussiansAloneWhenTheMapIsFrozen) {
   MapperConfig config = Frozen();
   config.schedule.final_steps = 20;
   const auto mapper = MapTheRoom(config);
@@ -109,8 +109,8 @@ TEST_F(MapperTest, RemembersHowGaussiansWereSpawned) {
 
 TEST_F(MapperTest, PrunesWhatHasBecomeTransparentEveryFewKeyframes) {
   MapperConfig config = Frozen();
-  config.prune_opacity = 0.5;
-  config.prune_interval = 2;
+  config.manage.prune_opacity = 0.5;
+  config.manage.interval = 2;
   const auto mapper = MakeMapper(config);
   mapper->Insert(KeyframeAt(0));
   const std::size_t all = mapper->Map().Size();

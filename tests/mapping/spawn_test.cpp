@@ -283,24 +283,51 @@ TEST_F(SpawnGaussiansTest, AreAsOpaqueAsTheyAreCertain) {
       const SpawnedGaussians spawned = Spawn(keyframe);
       ASSERT_EQ(spawned.gaussians.Size(), 1u);
       const double u = PhysicalConfidence(range, std::cos(static_cast<double>(lean)), {});
-      EXPECT_NEAR(spawned.confidence[0], u, 1e-5);
+      EXPECT_NEAR(spawned.signals[0].confidence, u, 1e-5);
       EXPECT_NEAR(OpacityOf(spawned.gaussians, 0), 0.1 + 0.8 * u, 1e-5);  // paper eq. 8
     }
   }
 }
 
+TEST_F(SpawnGaussiansTest, TakeFromTrackingWhatTheirModeLetsThem) {
+  const Keyframe keyframe = OnePoint(AlongTheBeam(20.0), {0.5f, 0.5f, 0.01f}, 0.5f, pool_);
+  const auto spawn = [&](SpawnMode mode) {
+    SpawnConfig config = FromPixels();
+    config.mode = mode;
+    config.fixed_scale_m = 0.123;
+    return Spawn(keyframe, config).gaussians;
+  };
+  const auto full = spawn(SpawnMode::kFull);
+  const auto no_opacity = spawn(SpawnMode::kNoOpacity);
+  const auto no_scale = spawn(SpawnMode::kNoRangeScale);
+  const auto identity = spawn(SpawnMode::kIdentity);
+  const double middle = 0.5 * (FromPixels().min_opacity + FromPixels().max_opacity);
+  ASSERT_GT(std::abs(ScaleOf(full, 0, 0) - 0.123), 0.05);
+  ASSERT_GT(std::abs(OpacityOf(full, 0) - middle), 0.05);
+  EXPECT_EQ(AxesOf(no_opacity, 0), AxesOf(full, 0));
+  EXPECT_EQ(ScaleOf(no_opacity, 0, 0), ScaleOf(full, 0, 0));
+  EXPECT_NEAR(OpacityOf(no_opacity, 0), middle, 1e-6);
+  EXPECT_EQ(AxesOf(no_scale, 0), AxesOf(full, 0));
+  EXPECT_NEAR(ScaleOf(no_scale, 0, 0), 0.123, 1e-6);
+  EXPECT_EQ(OpacityOf(no_scale, 0), OpacityOf(full, 0));
+  EXPECT_NEAR(std::abs(AxesOf(identity, 0)(2, 2)), 1.0f, 1e-6f);
+  EXPECT_NEAR(ScaleOf(identity, 0, 1), 0.123, 1e-6);
+  EXPECT_NEAR(OpacityOf(identity, 0), middle, 1e-6);
+}
+
 TEST_F(SpawnGaussiansTest, CarryTheControlScoreOfTheirSurface) {
   Keyframe keyframe = OnePoint(AlongTheBeam(5.0), {0.3f, 0.3f, 0.01f}, 0.0f, pool_);
-  EXPECT_TRUE(std::isnan(Spawn(keyframe).control_score[0]));  // one point is too few to know
+  EXPECT_TRUE(
+      std::isnan(Spawn(keyframe).signals[0].control_score));  // one point is too few to know
   keyframe.control_score[0] = 0.25f;
-  EXPECT_EQ(Spawn(keyframe).control_score[0], 0.25f);
+  EXPECT_EQ(Spawn(keyframe).signals[0].control_score, 0.25f);
 }
 
 TEST_F(SpawnGaussiansTest, CarryTheIntensityOfTheirPixel) {
   Keyframe keyframe = OnePoint(AlongTheBeam(5.0), {0.3f, 0.3f, 0.01f}, 0.0f, pool_);
-  EXPECT_EQ(Spawn(keyframe).intensity, std::vector<float>{0.0f});  // the scan has none
+  EXPECT_EQ(Spawn(keyframe).signals[0].intensity, 0.0f);  // the scan has none
   keyframe.tracked.intensity = {42.0f};
-  EXPECT_EQ(Spawn(keyframe).intensity, std::vector<float>{42.0f});
+  EXPECT_EQ(Spawn(keyframe).signals[0].intensity, 42.0f);
 }
 
 TEST_F(SpawnGaussiansTest, NeedAKnownSurface) {
@@ -331,7 +358,7 @@ TEST_F(SpawnGaussiansTest, OfPatchesLieCloserToTheSurfaceThanPixels) {
     double sum = 0.0;
     double count = 0.0;
     for (std::size_t i = 0; i < table.Size(); ++i) {
-      if (config.patches.enabled && spawned.density[i] == 0.0f) continue;
+      if (config.patches.enabled && spawned.signals[i].density == 0.0f) continue;
       const Triple m = TripleOf(table, i);
       const Eigen::Vector3d rim =
           Eigen::Vector3f(Eigen::Vector3f(m[0], m[1], m[2]) +

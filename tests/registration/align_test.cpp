@@ -9,10 +9,10 @@ namespace {
 
 const SE3 kTruth = MakePose(0.02, -0.03, 0.06, 0.25, -0.15, 0.08);
 
-RegistrationTarget TargetFrom(const SourceCloud& cloud, float confidence = 1.0f) {
+RegistrationTarget TargetFrom(const SourceCloud& cloud, float weight = 1.0f) {
   std::vector<TargetSurfel> surfels;
   AppendSurfels(cloud, SE3(), surfels);
-  for (TargetSurfel& surfel : surfels) surfel.confidence = confidence;
+  for (TargetSurfel& surfel : surfels) surfel.weight = weight;
   return RegistrationTarget(surfels, Eigen::Vector3d::Zero(), 1);
 }
 

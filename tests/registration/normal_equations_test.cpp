@@ -61,7 +61,7 @@ class FrozenCost {
       const Eigen::Vector3d position =
           motion.At(source_.phase[i]) * source_.points[i].cast<double>();
       const Eigen::Vector3d e = surfel.mean.cast<double>() + target_.OriginMap() - position;
-      sum += 0.5 * surfel.planar_weight * surfel.confidence * e.dot(metrics_[i] * e);
+      sum += 0.5 * surfel.weight * e.dot(metrics_[i] * e);
     }
     return sum;
   }
@@ -82,7 +82,7 @@ class FrozenCost {
 TEST_F(NormalEquationsTest, GradientAndHessianOfAll18UnknownsAgreeWithCentralDifferences) {
   constexpr double kNoKernel = 1e12;
   constexpr double kStep = 1e-4;
-  ScanResiduals residuals(source_, target_, 1.0, 0.1, true, pool_);
+  ScanResiduals residuals(source_, target_, 1.0, 0.1, pool_);
   const PhaseMoments moments = residuals.Evaluate(motion_, kNoKernel, 1, pool_);
   ASSERT_GT(moments.matches, 1000u);
   const NormalEquations analytic = Assemble(moments, motion_);

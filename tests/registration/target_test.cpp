@@ -42,31 +42,11 @@ TEST(RegistrationTarget, LeavesOutBrokenSurfels) {
   const TargetSurfel surfels[] = {{.mean = {nan, 0, 0}},
                                   {.rotation = Eigen::Quaternionf(0, 0, 0, 0)},
                                   {.scale0 = nan},
-                                  {.confidence = nan},
+                                  {.weight = nan},
                                   {.mean = {1, 2, 3}}};
   const RegistrationTarget target(surfels, Eigen::Vector3d::Zero(), 1);
   ASSERT_EQ(target.Size(), 1u);
   EXPECT_EQ(target.SurfelOf(0), 4);
-}
-
-TEST(PlanarWeights, PreferRoundSurfelsAndIgnoreASingleNeedle) {
-  std::vector<Eigen::Vector2f> scales;
-  for (int k = 0; k < 100; ++k) {
-    scales.emplace_back(0.2f, 0.2f * (1.0f + 0.02f * static_cast<float>(k)));
-  }
-  const std::vector<float> before = PlanarWeights(scales);
-  EXPECT_FLOAT_EQ(before.front(), 10.0f);
-  EXPECT_NEAR(before.back(), 1.0f, 0.01f);
-  EXPECT_TRUE(std::is_sorted(before.rbegin(), before.rend()));
-  scales.emplace_back(100.0f, 1e-4f);
-  const std::vector<float> after = PlanarWeights(scales);
-  EXPECT_NEAR(after[50], before[50], 0.1f);
-}
-
-TEST(PlanarWeights, AreEqualWithoutContrast) {
-  const std::vector<Eigen::Vector2f> scales(10, Eigen::Vector2f(0.3f, 0.1f));
-  for (const float weight : PlanarWeights(scales)) EXPECT_FLOAT_EQ(weight, 10.0f);
-  EXPECT_TRUE(PlanarWeights({}).empty());
 }
 
 }  // namespace

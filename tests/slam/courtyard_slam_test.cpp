@@ -21,7 +21,7 @@ double WalkAte(const SimulatedLidarConfig& lidar, int scans) {
   SlamConfig slam;
   slam.system.schedule = Schedule::kLockstep;
   slam.system.threads = 2;
-  slam.mapper.enabled = false;
+  slam.mapper.feedback.mode = FeedbackMode::kFrozen;
   const auto system = SlamSystem::Create(slam, simulation.Sensor()).value();
   ThreadPool pool(2);
   Trajectory poses;

@@ -164,7 +164,7 @@ TEST(SlamSystem, RefinesItsMapUnlessToldNotTo) {
   const std::vector<Scan> scans = Walk(kLong);
   const SlamRun refined = RunSlam(Config(Schedule::kLockstep), scans);
   SlamConfig config = Config(Schedule::kLockstep);
-  config.mapper.enabled = false;
+  config.mapper.feedback.mode = FeedbackMode::kFrozen;
   const SlamRun frozen = RunSlam(config, scans);
   ExpectTracked(frozen);
   EXPECT_EQ(frozen.system->GetMapper().Steps(), 0);

@@ -62,8 +62,8 @@ AnchorRange CpuEngine::Append(int anchor, const GaussianColumns<float>& fresh) {
 std::vector<std::size_t> CpuEngine::Keep(std::span<const std::uint8_t> keep) {
   COVSPLAT_CHECK(keep.size() == gaussians_.Size());
   KeptRows kept = KeepRows(ranges_, keep);
-  MoveRows(kept, gaussians_);
-  MoveRows(kept, moments_);
+  gaussians_.Gather(kept.old_row);
+  moments_.Gather(kept.old_row);
   ranges_ = std::move(kept.ranges);
   for (const AnchorRange& range : ranges_) {
     MakeInert(gaussians_, range.end, RoundUpToBlock(range.end));

@@ -1,4 +1,4 @@
-#include "covsplat/mapping/trackable.hpp"
+#include "covsplat/mapping/feedback.hpp"
 
 #include <cmath>
 #include <utility>
@@ -20,6 +20,8 @@ struct Surfel {
   double scale_v = 0.1;
   double opacity = 0.8;
   float confidence = 1.0f;
+  float control_score = 0.0f;
+  float density = 0.0f;
 };
 
 SpawnedGaussians Spawned(const std::vector<Surfel>& surfels) {
@@ -28,10 +30,8 @@ SpawnedGaussians Spawned(const std::vector<Surfel>& surfels) {
   for (std::size_t i = 0; i < surfels.size(); ++i) {
     const Surfel& s = surfels[i];
     SetGaussian(spawned.gaussians, i, s.mean, s.q, s.scale_u, s.scale_v, s.opacity);
-    spawned.confidence.push_back(s.confidence);
-    spawned.control_score.push_back(0.0f);
-    spawned.density.push_back(0.0f);
-    spawned.intensity.push_back(0.0f);
+    spawned.signals.push_back(
+        {.confidence = s.confidence, .control_score = s.control_score, .density = s.density});
   }
   return spawned;
 }
@@ -51,7 +51,7 @@ class BuildTargetTest : public ::testing::Test {
   void Add(const std::vector<Surfel>& surfels, const SE3& T_map_keyframe = SE3()) {
     map_.AddKeyframe(Blind(T_map_keyframe), Spawned(surfels));
   }
-  std::shared_ptr<const RegistrationTarget> Build(const TrackableConfig& config = {},
+  std::shared_ptr<const RegistrationTarget> Build(const FeedbackConfig& config = {},
                                                   const SE3& T_map_sensor = SE3()) {
     return BuildTarget(map_, T_map_sensor, kReach, config);
   }
@@ -94,7 +94,7 @@ TEST_F(BuildTargetTest, LeavesOutWhatHasNotBeenSeenForLong) {
   Add({{.mean = {5, 0, 0}}, {.mean = {0, 5, 0}}});
   Add({{.mean = {0, -5, 0}}});
   Add({});
-  const TrackableConfig one_keyframe{.max_keyframe_age = 1};
+  const FeedbackConfig one_keyframe{.max_keyframe_age = 1};
   ASSERT_EQ(Build(one_keyframe)->Size(), 1u);
   EXPECT_EQ(Build(one_keyframe)->At(0).mean.y(), -5.0f);
   EXPECT_EQ(Build({.max_keyframe_age = 2})->Size(), 3u);
@@ -159,16 +159,33 @@ TEST_F(BuildTargetTest, WeighsRoundGaussiansMoreThanNeedles) {
   const auto target = Build();
   ASSERT_EQ(target->Size(), surfels.size());
   // Paper eq. 5: w_max = 10 at the least curvature, 1 at the largest.
-  EXPECT_FLOAT_EQ(RecordOf(*target, 0).planar_weight, 10.0f);
-  EXPECT_NEAR(RecordOf(*target, 1).planar_weight, 1.0f, 0.01f);
+  EXPECT_FLOAT_EQ(RecordOf(*target, 0).weight, 10.0f);
+  EXPECT_NEAR(RecordOf(*target, 1).weight, 1.0f, 0.01f);
 }
 
-TEST_F(BuildTargetTest, WeighsMatchesByGammaIfAsked) {
-  Add({{.opacity = 0.5, .confidence = 0.6f}, {.mean = {1, 0, 0}, .confidence = 0.0f}});
-  const auto weighted = Build({.weight_by_confidence = true});
-  EXPECT_NEAR(RecordOf(*weighted, 0).confidence, 0.3f, 1e-6f);
-  EXPECT_GT(RecordOf(*weighted, 1).confidence, 0.0f) << "no Gaussian is without any weight";
-  EXPECT_EQ(RecordOf(*Build(), 0).confidence, 1.0f);
+TEST_F(BuildTargetTest, WeighsMatchesAsAsked) {
+  Add({{.opacity = 0.5, .confidence = 0.6f, .control_score = 0.2f, .density = 1000.0f},
+       {.mean = {1, 0, 0}, .confidence = 0.0f, .control_score = std::nanf("")}});
+  const auto weights = [&](const FeedbackConfig& config) {
+    const auto target = Build(config);
+    return std::pair(RecordOf(*target, 0).weight, RecordOf(*target, 1).weight);
+  };
+  const auto [sure, unsure] = weights({.weight = MatchWeight::kConfidence});
+  EXPECT_NEAR(sure, 0.3f, 1e-6f);
+  EXPECT_GT(unsure, 0.0f) << "no Gaussian is without any weight";
+  const auto [simple, unknown] = weights({.weight = MatchWeight::kControl});
+  EXPECT_NEAR(simple, 1.0f / 0.201f, 1e-5f);
+  EXPECT_NEAR(unknown, 1.0f / 0.501f, 1e-5f);
+  const auto [many, one] = weights({.weight = MatchWeight::kSupport});
+  EXPECT_NEAR(many, 120.0f / 130.0f, 1e-5f);  // 1000 per m2 on 12 * 0.1 m * 0.1 m
+  EXPECT_NEAR(one, 1.0f / 11.0f, 1e-6f);
+  EXPECT_EQ(weights({.mode = FeedbackMode::kNoWeight}), std::pair(1.0f, 1.0f));
+}
+
+TEST_F(BuildTargetTest, TakesAllGaussiansWithoutAFilter) {
+  Add({{.mean = {1, 0, 0}, .opacity = 0.005}, {.mean = {2, 0, 0}}});
+  EXPECT_EQ(Build()->Size(), 1u);
+  EXPECT_EQ(Build({.mode = FeedbackMode::kNoFilter})->Size(), 2u);
 }
 
 TEST_F(BuildTargetTest, TakesCovariancesFromTheGaussianAloneWhateverIsAroundIt) {
@@ -195,6 +212,26 @@ TEST_F(BuildTargetTest, LeavesOutGaussiansThatAreNoLongerFinite) {
   Add({{.mean = {std::nan(""), 0, 0}}, {.opacity = std::nan("")}, {.mean = {1, 0, 0}}});
   ASSERT_EQ(Build()->Size(), 1u);
   EXPECT_EQ(Build()->At(0).mean.x(), 1.0f);
+}
+
+TEST(ScaleWeights, PreferRoundSurfelsAndIgnoreASingleNeedle) {
+  std::vector<Eigen::Vector2f> scales;
+  for (int k = 0; k < 100; ++k) {
+    scales.emplace_back(0.2f, 0.2f * (1.0f + 0.02f * static_cast<float>(k)));
+  }
+  const std::vector<float> before = ScaleWeights(scales);
+  EXPECT_FLOAT_EQ(before.front(), 10.0f);
+  EXPECT_NEAR(before.back(), 1.0f, 0.01f);
+  EXPECT_TRUE(std::is_sorted(before.rbegin(), before.rend()));
+  scales.emplace_back(100.0f, 1e-4f);
+  const std::vector<float> after = ScaleWeights(scales);
+  EXPECT_NEAR(after[50], before[50], 0.1f);
+}
+
+TEST(ScaleWeights, AreEqualWithoutContrast) {
+  const std::vector<Eigen::Vector2f> scales(10, Eigen::Vector2f(0.3f, 0.1f));
+  for (const float weight : ScaleWeights(scales)) EXPECT_FLOAT_EQ(weight, 10.0f);
+  EXPECT_TRUE(ScaleWeights({}).empty());
 }
 
 }  // namespace

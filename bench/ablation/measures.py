@@ -1,0 +1,132 @@
+"""One run of covsplat, measured: what the tables of ablations are made of."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import subprocess
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from variants import Variant
+
+VOXEL_M = 0.1
+TAU_M = 0.2
+KEEP = ("measures.json", "config.yaml", "metrics.json")
+
+
+@dataclass(frozen=True)
+class Measures:
+    ate_m: float
+    accuracy_cm: float
+    completeness_cm: float
+    chamfer_l1_cm: float
+    f_percent: float
+    strict_f_percent: float
+    strict_f_fine_percent: float  # at 0.05 m
+    gaussians: float
+    map_mb: float
+    tracking_scans_per_s: float
+    iterations: float
+    unmatched_percent: float
+    depth_error_cm: float
+
+
+@dataclass(frozen=True)
+class World:
+    name: str
+    folder: Path
+    scans: int | None
+
+
+@dataclass(frozen=True)
+class Job:
+    world: World
+    seed: int
+    variant: Variant
+
+
+def measured(job: Job, covsplat: Path, out: Path, again: bool) -> Measures:
+    """Runs, meshes and evaluates; a run with the same settings is not made twice.
+
+    In lockstep: the same steps for every variant, the same result for any number of threads.
+    """
+    run = out / f"{job.world.name}-{job.seed}" / job.variant.name
+    command = [str(covsplat), "run", str(job.world.folder), "-o", str(run)]
+    command += ["--deterministic", "--threads", "1", "--overwrite", "--quiet"]
+    command += [part for setting in job.variant.settings for part in ("-s", setting)]
+    if job.world.scans is not None:
+        command += ["-n", str(job.world.scans)]
+    about = {"command": command[1:], "program": version(covsplat)}
+    cache = run / "measures.json"
+    if cache.is_file() and not again:
+        known = json.loads(cache.read_text())
+        if known["about"] == about:
+            return Measures(**known["measures"])
+    call(command)
+    measures = evaluate(covsplat, run, job.world.folder)
+    cache.write_text(json.dumps({"about": about, "measures": asdict(measures)}, indent=2) + "\n")
+    for path in run.iterdir():
+        if path.name not in KEEP:
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    return measures
+
+
+def evaluate(covsplat: Path, run: Path, recording: Path) -> Measures:
+    mesh = run / "mesh.ply"
+    program, common = str(covsplat), ["--threads", "1", "--quiet"]
+    call([program, "mesh", str(run), "-o", str(mesh), "--voxel", str(VOXEL_M), *common])
+    track = [str(run / "trajectory_tum.txt"), str(recording / "gt_tum.txt")]
+    trajectory = json.loads(call([program, "eval", "traj", *track, "--json"]))
+    surface = [program, "eval", "map", str(mesh), str(recording / "gt_mesh.ply")]
+    surface += ["--recording", str(recording), "--run", str(run)]
+    surface += ["--tau", f"{TAU_M},0.05", "--json", *common]
+    found = json.loads(call(surface))
+    paper, strict = found["paper"], found["strict"]
+    metrics = json.loads((run / "metrics.json").read_text())
+    frames = tracked_frames(run)
+    return Measures(
+        ate_m=trajectory["ate_translation_m"]["rmse"],
+        accuracy_cm=paper["accuracy_cm"],
+        completeness_cm=paper["completeness_cm"],
+        chamfer_l1_cm=paper["chamfer_l1_cm"],
+        f_percent=paper["scores"][0]["f_score_percent"],
+        strict_f_percent=strict["scores"][0]["f_score_percent"],
+        strict_f_fine_percent=strict["scores"][1]["f_score_percent"],
+        gaussians=metrics["map"]["gaussians"],
+        map_mb=metrics["map"]["file_bytes"] / 1e6,
+        tracking_scans_per_s=1e3 / mean(frames, tracking_ms),
+        iterations=mean(frames, lambda frame: float(frame["iterations"])),
+        unmatched_percent=100.0 * mean(frames, unmatched),
+        depth_error_cm=100.0 * metrics["held_out"]["after"]["mean_abs_m"],
+    )
+
+
+def tracked_frames(run: Path) -> list[dict[str, str]]:
+    with (run / "frames.csv").open(newline="") as lines:
+        return [row for row in csv.DictReader(lines) if int(row["iterations"]) > 0]
+
+
+def tracking_ms(frame: dict[str, str]) -> float:
+    return sum(float(frame[f"{stage}_ms"]) for stage in ("preprocess", "align", "deskew"))
+
+
+def unmatched(frame: dict[str, str]) -> float:
+    return 1.0 - int(frame["correspondences"]) / max(1, int(frame["source_points"]))
+
+
+def mean(frames: list[dict[str, str]], value) -> float:
+    return sum(map(value, frames)) / max(1, len(frames))
+
+
+def version(covsplat: Path) -> str:
+    """Of the program's bytes: a version's number does not change with every change."""
+    return call(["sha256sum", str(covsplat)]).split()[0]
+
+
+def call(command: list[str]) -> str:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(command)}\n{done.stderr[-2000:]}")
+    return done.stdout
