@@ -45,7 +45,7 @@ struct EnumNames<MatchWeight> {
 
 struct FeedbackConfig {
   FeedbackMode mode = FeedbackMode::kFull;
-  MatchWeight weight = MatchWeight::kScales;
+  MatchWeight weight = MatchWeight::kSupport;
   int max_keyframe_age = 100;
   double min_opacity = 0.01;
   double min_confidence = 0.0;

@@ -14,8 +14,8 @@ namespace covsplat {
 
 struct ReliabilityConfig {
   bool enabled = true;
-  int keyframes = 8;
-  int min_seen_through = 2;
+  int keyframes = 5;
+  int min_seen_through = 3;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {

@@ -156,7 +156,7 @@ TEST_F(BuildTargetTest, WeighsRoundGaussiansMoreThanNeedles) {
     surfels.push_back({.mean = {0.5 * i, 0, 0}, .scale_u = i % 2 == 0 ? 0.1 : 0.5});
   }
   Add(surfels);
-  const auto target = Build();
+  const auto target = Build({.weight = MatchWeight::kScales});
   ASSERT_EQ(target->Size(), surfels.size());
   // Paper eq. 5: w_max = 10 at the least curvature, 1 at the largest.
   EXPECT_FLOAT_EQ(RecordOf(*target, 0).weight, 10.0f);

@@ -64,8 +64,8 @@ TEST(MovingThings, AreToldFromWhatStandsStill) {
                 counts.Precision(),
                 counts.Recall());
     ASSERT_GT(counts.moving, 1000.0);
-    EXPECT_GT(counts.Precision(), 0.5);
-    EXPECT_GT(counts.Recall(), 0.5);
+    EXPECT_GT(counts.Precision(), 0.8);
+    EXPECT_GT(counts.Recall(), 0.6);
   }
 }
 
