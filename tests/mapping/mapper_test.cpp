@@ -130,6 +130,30 @@ TEST_F(MapperTest, PrunesWhatHasBecomeTransparentEveryFewKeyframes) {
   EXPECT_LT(mapper->Map().Size(), all);
 }
 
+TEST_F(MapperTest, MakesNothingOfWhatStandsWhereItHasSeenThrough) {
+  const Box thing{{3.0, 1.0, -1.5}, {4.0, 2.0, 0.5}};
+  const auto gaussians_on_it = [&](bool masks) {
+    MapperConfig config = Frozen();
+    config.reliability.enabled = masks;
+    const auto mapper = MakeMapper(config);
+    for (int k = 0; k < config.reliability.min_seen_through; ++k) mapper->Insert(KeyframeAt(k));
+    RayScene scene = Room();
+    scene.Add(thing);
+    const SE3 pose = PoseOfKeyframe(config.reliability.min_seen_through);
+    mapper->Insert(StillKeyframe(scene, sensor_, pose, kNoise, 9, pool_));
+    std::size_t count = 0;
+    for (const Disc& disc : mapper->Map().Near(SE3(), 100.0).discs) {
+      const Eigen::Vector3d mean = disc.mean.cast<double>();
+      count += (mean.array() > thing.low.array() - 0.1).all() &&
+               (mean.array() < thing.high.array() + 0.1).all() && mean.z() > thing.low.z() + 0.3;
+    }
+    return count;
+  };
+  const std::size_t unmasked = gaussians_on_it(false);
+  EXPECT_GT(unmasked, 20u);
+  EXPECT_LT(gaussians_on_it(true), unmasked / 5);
+}
+
 TEST_F(MapperTest, MakesTargetsOfTheKeyframesThatItHas) {
   const auto mapper = MakeMapper();
   const auto none = mapper->MakeTarget(SE3());
