@@ -85,9 +85,11 @@ Eigen::Vector2d ExpansionOf(const Piece& piece, const CoverJob& job) {
     const Disc& disc = job.gaussians[i].disc;
     const double area = static_cast<double>(disc.u.norm()) * disc.v.norm();
     for (int k = 0; k < kPlaces; ++k) {
+      const int along_u = k % 3 - 1;
+      const int along_v = k / 3 - 1;
       const Eigen::Vector3d place = disc.mean.cast<double>() +
-                                    step * (k % 3 - 1) * disc.u.cast<double>() +
-                                    step * (k / 3 - 1) * disc.v.cast<double>();
+                                    step * along_u * disc.u.cast<double>() +
+                                    step * along_v * disc.v.cast<double>();
       const Eigen::Vector2d at = piece.axes.leftCols<2>().transpose() * (place - piece.mean);
       for (int axis = 0; axis < 2; ++axis) {
         distances[static_cast<std::size_t>(axis)].emplace_back(std::abs(at[axis]) / reach[axis],

@@ -22,9 +22,11 @@ SpawnedGaussians Wall(float control_score, double opacity = 0.8, double distance
   const Eigen::Quaterniond facing(Eigen::AngleAxisd(-0.5 * M_PI, Eigen::Vector3d::UnitY()));
   const double scale_m = kExtentFactor * 0.1 / std::sqrt(12.0);
   SpawnedGaussians wall;
-  wall.gaussians.Resize(kSide * kSide);
+  wall.gaussians.Resize(std::size_t{kSide} * kSide);
   for (int i = 0; i < kSide * kSide; ++i) {
-    const Eigen::Vector3d mean(distance_m, 0.1 * (i % kSide) - 0.75, 0.1 * (i / kSide) - 0.75);
+    const int column = i % kSide;
+    const int row = i / kSide;
+    const Eigen::Vector3d mean(distance_m, 0.1 * column - 0.75, 0.1 * row - 0.75);
     SetGaussian(
         wall.gaussians, static_cast<std::size_t>(i), mean, facing, scale_m, scale_m, opacity);
     wall.signals.push_back({.confidence = 0.5f,
