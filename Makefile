@@ -59,8 +59,8 @@ bench-peers: setup build-release .venv/peers $(addprefix simulate-,$(WORLDS))  #
 	  $(if $(ONLY),--only '$(ONLY)',--update docs/benchmarks.md)
 
 # Runs with the same program and settings are kept: interrupted, it goes on where it was.
-bench-ablation: setup build-release  ## Run the paper's ablations (hours): docs/benchmarks.md
-	python3 bench/ablation/run.py --covsplat build/release/apps/covsplat --out bench_out/ablation \
+bench-ablation: setup build-release .venv/peers  ## Run the paper's ablations (hours): docs/benchmarks.md
+	PYTHONPATH=bench/peers .venv/bin/python bench/ablation/run.py --covsplat build/release/apps/covsplat --out bench_out/ablation \
 	  $(if $(ONLY),--only '$(ONLY)',--update docs/benchmarks.md)
 
 .venv/oracles: tools/oracles/requirements.txt

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
 import shutil
-import subprocess
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from covsplat_run import mesh_of_run, score_mesh
+from processes import run_program
+from recording import Recording
 from variants import Variant
 
 VOXEL_M = 0.1
-TAU_M = 0.2
+TAU_M, FINE_TAU_M = 0.2, 0.05
 KEEP = ("measures.json", "config.yaml", "metrics.json")
 
 
@@ -24,7 +28,7 @@ class Measures:
     chamfer_l1_cm: float
     f_percent: float
     strict_f_percent: float
-    strict_f_fine_percent: float  # at 0.05 m
+    strict_f_fine_percent: float
     gaussians: float
     map_mb: float
     tracking_scans_per_s: float
@@ -64,7 +68,7 @@ def measured(job: Job, covsplat: Path, out: Path, again: bool) -> Measures:
         known = json.loads(cache.read_text())
         if known["about"] == about:
             return Measures(**known["measures"])
-    call(command)
+    run_program(command)
     measures = evaluate(covsplat, run, job.world.folder)
     cache.write_text(json.dumps({"about": about, "measures": asdict(measures)}, indent=2) + "\n")
     for path in run.iterdir():
@@ -74,26 +78,23 @@ def measured(job: Job, covsplat: Path, out: Path, again: bool) -> Measures:
 
 
 def evaluate(covsplat: Path, run: Path, recording: Path) -> Measures:
-    mesh = run / "mesh.ply"
-    program, common = str(covsplat), ["--threads", "1", "--quiet"]
-    call([program, "mesh", str(run), "-o", str(mesh), "--voxel", str(VOXEL_M), *common])
-    track = [str(run / "trajectory_tum.txt"), str(recording / "gt_tum.txt")]
-    trajectory = json.loads(call([program, "eval", "traj", *track, "--json"]))
-    surface = [program, "eval", "map", str(mesh), str(recording / "gt_mesh.ply")]
-    surface += ["--recording", str(recording), "--run", str(run)]
-    surface += ["--tau", f"{TAU_M},0.05", "--json", *common]
-    found = json.loads(call(surface))
-    paper, strict = found["paper"], found["strict"]
+    mesh, trajectory = run / "mesh.ply", run / "trajectory_tum.txt"
+    mesh_of_run(covsplat, run, mesh, VOXEL_M, threads=1)
+    score = score_mesh(
+        covsplat, mesh, Recording.open(recording), (TAU_M, FINE_TAU_M), 1, trajectory
+    )
+    track = [str(trajectory), str(recording / "gt_tum.txt")]
+    errors = json.loads(run_program([str(covsplat), "eval", "traj", *track, "--json"]).stdout)
     metrics = json.loads((run / "metrics.json").read_text())
     frames = tracked_frames(run)
     return Measures(
-        ate_m=trajectory["ate_translation_m"]["rmse"],
-        accuracy_cm=paper["accuracy_cm"],
-        completeness_cm=paper["completeness_cm"],
-        chamfer_l1_cm=paper["chamfer_l1_cm"],
-        f_percent=paper["scores"][0]["f_score_percent"],
-        strict_f_percent=strict["scores"][0]["f_score_percent"],
-        strict_f_fine_percent=strict["scores"][1]["f_score_percent"],
+        ate_m=errors["ate_translation_m"]["rmse"],
+        accuracy_cm=score.paper.accuracy_cm,
+        completeness_cm=score.paper.completeness_cm,
+        chamfer_l1_cm=score.paper.chamfer_l1_cm,
+        f_percent=score.paper.f_percent[TAU_M],
+        strict_f_percent=score.strict.f_percent[TAU_M],
+        strict_f_fine_percent=score.strict.f_percent[FINE_TAU_M],
         gaussians=metrics["map"]["gaussians"],
         map_mb=metrics["map"]["file_bytes"] / 1e6,
         tracking_scans_per_s=1e3 / mean(frames, tracking_ms),
@@ -116,17 +117,10 @@ def unmatched(frame: dict[str, str]) -> float:
     return 1.0 - int(frame["correspondences"]) / max(1, int(frame["source_points"]))
 
 
-def mean(frames: list[dict[str, str]], value) -> float:
+def mean(frames: list[dict[str, str]], value: Callable[[dict[str, str]], float]) -> float:
     return sum(map(value, frames)) / max(1, len(frames))
 
 
 def version(covsplat: Path) -> str:
     """Of the program's bytes: a version's number does not change with every change."""
-    return call(["sha256sum", str(covsplat)]).split()[0]
-
-
-def call(command: list[str]) -> str:
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise RuntimeError(f"{' '.join(command)}\n{done.stderr[-2000:]}")
-    return done.stdout
+    return hashlib.sha256(covsplat.read_bytes()).hexdigest()

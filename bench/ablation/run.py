@@ -1,6 +1,6 @@
 """Runs the paper's ablations on simulated worlds and writes its four tables, ours beside theirs.
 
-python3 bench/ablation/run.py --covsplat build/release/apps/covsplat
+PYTHONPATH=bench/peers .venv/bin/python bench/ablation/run.py --covsplat build/release/apps/covsplat
 """
 
 from __future__ import annotations
@@ -8,17 +8,18 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import shlex
 import statistics
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from datetime import UTC, datetime
 from pathlib import Path
 
-from measures import Job, Measures, World, call, measured
+import page
+import report
+from measures import Job, Measures, World, measured
+from processes import run_program
 from variants import TABLES, Table, Variant, all_variants
 
-BEGIN, END = "<!-- ablation:begin -->", "<!-- ablation:end -->"
 PAPER_NAMES = ("paper, quad", "paper, Keble")
 # Column, its figure, digits.
 COLUMNS = {
@@ -39,6 +40,7 @@ Found = dict[tuple[str, Variant], list[Measures]]
 
 def main() -> int:
     options = parse()
+    load_before = os.getloadavg()
     worlds = {name: scans for name, scans in map(world_and_scans, options.world)}
     jobs = [
         Job(World(name, options.out / f"{name}-{seed}" / "recording", scans), seed, variant)
@@ -55,9 +57,10 @@ def main() -> int:
         for job, measures in zip(jobs, pool.map(run, jobs), strict=True):
             found.setdefault((job.world.name, job.variant), []).append(measures)
             print(f"{job.world.name} {job.seed} {job.variant.name}: {measures}", flush=True)
-    text = circumstances(options) + "".join(tables(table, list(worlds), found) for table in TABLES)
+    about = page.circumstances(shlex.join(sys.argv), load_before)
+    text = heading(about) + "".join(tables(table, list(worlds), found) for table in TABLES)
     if options.update is not None:
-        update(options.update, text)
+        page.update(options.update, "ablation", text)
     print("\n" + text)
     return 0
 
@@ -99,16 +102,12 @@ def simulate(covsplat: Path, job: Job) -> None:
         return
     command = [str(covsplat), "simulate", job.world.name, "--sensor", "os1-64"]
     command += ["--motion", "walking", "--seed", str(job.seed), "-o", str(folder)]
-    call([*command, "--overwrite", "--quiet"])
+    run_program([*command, "--overwrite", "--quiet"])
 
 
-def circumstances(options: argparse.Namespace) -> str:
-    here = str(Path(__file__).resolve().parent)
-    commit = subprocess.run(
-        ["git", "-C", here, "rev-parse", "--short", "HEAD"], capture_output=True, text=True
-    ).stdout.strip()
-    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return f"{now}, commit {commit}.\n\n`python3 {' '.join(sys.argv)}`\n"
+def heading(about: dict[str, object]) -> str:
+    place = f"commit {about['commit']}, {about['cpu']}, {about['cores']} cores"
+    return f"{about['date']}, {place}.\n\n`PYTHONPATH=bench/peers python3 {about['command']}`\n"
 
 
 def tables(table: Table, worlds: list[str], found: Found) -> str:
@@ -119,14 +118,14 @@ def tables(table: Table, worlds: list[str], found: Found) -> str:
     has_keble = any(row.paper.keble for row in table.rows)
     for name in PAPER_NAMES[: 1 + has_keble]:
         header += [f"{name}: {column}" for column in table.paper_columns]
-    lines = [header, ["---"] * len(header)]
+    lines = []
     for row in table.rows:
         cells = [row.label]
         for world in worlds:
             runs = found.get((world, row.variant), [])
             cells += [cell(column, runs) for column in table.columns]
         lines.append([*cells, *row.paper.quad, *row.paper.keble])
-    return f"\n{table.title}:\n\n" + "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+    return f"\n{table.title}:\n\n{report.table(header, lines)}\n"
 
 
 def cell(column: str, runs: list[Measures]) -> str:
@@ -137,14 +136,6 @@ def cell(column: str, runs: list[Measures]) -> str:
     if column == "strict F":
         text += f" / {statistics.median(run.strict_f_fine_percent for run in runs):.2f}"
     return text
-
-
-def update(path: Path, text: str) -> None:
-    content = path.read_text()
-    if content.count(BEGIN) != 1 or content.count(END) != 1:
-        raise SystemExit(f"{path}: needs the lines {BEGIN} and {END} once each")
-    head, rest = content.split(BEGIN)
-    path.write_text(f"{head}{BEGIN}\n{text}{END}{rest.split(END)[1]}")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from pathlib import Path
 import map_runs
 import report
 
-BEGIN, END = "<!-- peers:begin -->", "<!-- peers:end -->"
 PACKAGES = (
     "kiss-icp",
     "kiss-slam",
@@ -93,11 +92,12 @@ def as_json(results: Results, about: dict[str, object]) -> str:
     return json.dumps({"about": about, **asdict(results)}, indent=2) + "\n"
 
 
-def update(path: Path, text: str) -> None:
-    """Replaces what stands between the markers."""
+def update(path: Path, block: str, text: str) -> None:
+    """Replaces what stands between the markers of a block."""
+    begin, end = f"<!-- {block}:begin -->", f"<!-- {block}:end -->"
     content = path.read_text()
-    if content.count(BEGIN) != 1 or content.count(END) != 1:
-        raise SystemExit(f"{path}: needs the lines {BEGIN} and {END} once each")
-    head, rest = content.split(BEGIN)
-    _, tail = rest.split(END)
-    path.write_text(f"{head}{BEGIN}\n{text}{END}{tail}")
+    if content.count(begin) != 1 or content.count(end) != 1:
+        raise SystemExit(f"{path}: needs the lines {begin} and {end} once each")
+    head, rest = content.split(begin)
+    _, tail = rest.split(end)
+    path.write_text(f"{head}{begin}\n{text}{end}{tail}")

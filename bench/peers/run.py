@@ -114,7 +114,7 @@ def write(results: page.Results, about: dict[str, object], options: argparse.Nam
     text += "".join(f"\n![{title}]({file.name})\n" for title, file in drawn)
     (options.out / "peers.md").write_text(text)
     if options.update is not None:
-        page.update(options.update, text)
+        page.update(options.update, "peers", text)
     print("\n" + text)
 
 

@@ -155,9 +155,10 @@ class ReportTest(unittest.TestCase):
     def test_only_what_stands_between_the_markers_changes(self) -> None:
         with tempfile.TemporaryDirectory() as name:
             path = Path(name) / "page.md"
-            path.write_text(f"before\n{page.BEGIN}\nold\n{page.END}\nafter\n")
-            page.update(path, "new\n")
-            self.assertEqual(path.read_text(), f"before\n{page.BEGIN}\nnew\n{page.END}\nafter\n")
+            begin, end = "<!-- peers:begin -->", "<!-- peers:end -->"
+            path.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
+            page.update(path, "peers", "new\n")
+            self.assertEqual(path.read_text(), f"before\n{begin}\nnew\n{end}\nafter\n")
 
     def test_rows_have_the_cells_of_their_header(self) -> None:
         scored = SurfaceScore(1.0, 2.0, 1.5, dict.fromkeys(map_runs.TAUS_M, 90.0))

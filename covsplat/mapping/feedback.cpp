@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "covsplat/core/percentile.hpp"
+
 namespace covsplat {
 namespace {
 
@@ -16,22 +18,10 @@ constexpr float kHalfSupport = 10.0f;
 /// `x` in [0, 1], 0 is best (paper eq. 5).
 float Preference(float x) { return std::min(1.0f / (x + kEpsilon), kMaxWeight); }
 
-// Value below which a share of the values lies; reorders them.
-float Percentile(std::vector<float>& values, double share) {
-  const auto nth =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
-}
-
-float OpacityOf(const GaussianMap& map, std::size_t row) {
-  return 1.0f / (1.0f + std::exp(-map.Engine().Gaussians().Column(kOpacityLogit)[row]));
-}
-
 // Written so that NaN fails.
 bool IsTrackable(const GaussianMap& map, std::size_t row, const FeedbackConfig& config) {
   const GaussianSignals& signals = map.Signals()[row];
-  const float opacity = OpacityOf(map, row);
+  const float opacity = OpacityOf(map.Engine().Gaussians(), row);
   return signals.trackable && signals.last_seen >= map.Keyframes() - 1 - config.max_keyframe_age &&
          opacity >= static_cast<float>(config.min_opacity) &&
          opacity * signals.confidence >= static_cast<float>(config.min_confidence);
@@ -55,7 +45,7 @@ float WeightOf(const GaussianMap& map,
       // Nothing known: neither preferred nor put back.
       return Preference(std::isnan(signals.control_score) ? 0.5f : signals.control_score);
     case MatchWeight::kConfidence:
-      return std::max(OpacityOf(map, row) * signals.confidence, kMinWeight);
+      return std::max(OpacityOf(map.Engine().Gaussians(), row) * signals.confidence, kMinWeight);
     case MatchWeight::kSupport: {
       const float support = SupportOf(signals, surfel);
       return support / (support + kHalfSupport);

@@ -6,13 +6,14 @@
 #include <map>
 #include <numbers>
 
+#include "covsplat/core/percentile.hpp"
 #include "covsplat/registration/voxel_hash.hpp"
 
 namespace covsplat {
 namespace {
 
-float OpacityOf(const GaussianMap& map, std::size_t row) {
-  return 1.0f / (1.0f + std::exp(-map.Engine().Gaussians().Column(kOpacityLogit)[row]));
+float OpacityAt(const GaussianMap& map, std::size_t row) {
+  return OpacityOf(map.Engine().Gaussians(), row);
 }
 
 float AreaOf(const Disc& disc) { return disc.u.norm() * disc.v.norm(); }
@@ -36,15 +37,11 @@ class Exchange {
     Eigen::Matrix3f axes;
     axes << disc.u.normalized(), disc.v.normalized(), disc.u.cross(disc.v).normalized();
     const float alpha = std::min(opacity, kMaxOpacity);
-    const std::size_t i = fresh.spawned.signals.size();
-    fresh.spawned.gaussians.Resize(i + 1);
-    WriteGaussian(fresh.spawned.gaussians,
-                  i,
-                  rotation * disc.mean + fresh.T_keyframe_frame.Translation().cast<float>(),
-                  Eigen::Quaternionf(Eigen::Matrix3f(rotation * axes)).normalized(),
-                  {std::log(disc.u.norm()), std::log(disc.v.norm())},
-                  std::log(alpha / (1.0f - alpha)));
-    fresh.spawned.signals.push_back(signals);
+    fresh.spawned.Add(rotation * disc.mean + fresh.T_keyframe_frame.Translation().cast<float>(),
+                      rotation * axes,
+                      {std::log(disc.u.norm()), std::log(disc.v.norm())},
+                      std::log(alpha / (1.0f - alpha)),
+                      signals);
   }
 
   void Apply() {
@@ -73,10 +70,7 @@ float ControlQuantile(const GaussianMap& map, const NearGaussians& near, double 
     if (!std::isnan(score)) scores.push_back(score);
   }
   if (scores.empty()) return std::numeric_limits<float>::quiet_NaN();
-  const auto nth = scores.begin() + static_cast<std::ptrdiff_t>(
-                                        std::floor(share * static_cast<double>(scores.size() - 1)));
-  std::ranges::nth_element(scores, nth);
-  return *nth;
+  return Percentile(scores, share);
 }
 
 /// [near] whether a Gaussian is in a cell with, or next to, one of the last keyframes.
@@ -146,7 +140,7 @@ void CoverAndPrune(GaussianMap& map,
   std::vector<std::size_t> chosen;
   std::vector<PlanarGaussian> planar;
   for (std::size_t i = 0; i < near.discs.size(); ++i) {
-    const float opacity = OpacityOf(map, near.row[i]);
+    const float opacity = OpacityAt(map, near.row[i]);
     const bool is_planar =
         !config.feature_aware || map.Signals()[near.row[i]].control_score <= limit;
     if (is_next[i] == 0 || !is_planar || opacity < config.plane.min_opacity) continue;
@@ -156,7 +150,7 @@ void CoverAndPrune(GaussianMap& map,
   Exchange exchange(map, T_map_sensor);
   for (const PlaneCover& cover : CoverPlanes(planar, extent_factor, config.plane)) {
     std::vector<std::size_t> members;
-    int keyframe = 0;  // the newest: it is the one that is known best to where they are
+    int keyframe = 0;  // the newest among those of its members
     for (const std::size_t i : cover.members) {
       members.push_back(chosen[i]);
       keyframe = std::max(keyframe, near.keyframe[chosen[i]]);
@@ -178,7 +172,7 @@ std::vector<std::size_t> ChooseToSplit(const GaussianMap& map,
     const float major_m = std::max(near.discs[i].u.norm(), near.discs[i].v.norm());
     const GaussianSignals& signals = map.Signals()[near.row[i]];
     if (major_m < config.split.min_scale_m || signals.splits >= config.split.max_splits) continue;
-    if (OpacityOf(map, near.row[i]) < config.split.min_opacity) continue;
+    if (OpacityAt(map, near.row[i]) < config.split.min_opacity) continue;
     if (config.feature_aware && !(signals.control_score >= limit)) continue;
     wanted.emplace_back(config.feature_aware ? -signals.control_score : -major_m, i);
   }
@@ -210,7 +204,7 @@ void Split(GaussianMap& map,
       Disc half = whole;
       half.mean += side * offset * (along_u ? whole.u : whole.v);
       (along_u ? half.u : half.v) *= 0.5f;
-      exchange.Add(near.keyframe[i], half, OpacityOf(map, near.row[i]), signals);
+      exchange.Add(near.keyframe[i], half, OpacityAt(map, near.row[i]), signals);
     }
     exchange.Remove(near.row[i]);
   }
@@ -236,7 +230,7 @@ void Shed(GaussianMap& map, std::size_t max_gaussians) {
   for (const AnchorRange& range : map.Engine().Ranges()) {
     for (std::size_t i = range.begin; i < range.end; ++i) {
       const float log_area = table.Column(kLogScaleU)[i] + table.Column(kLogScaleV)[i];
-      by_value.emplace_back(OpacityOf(map, i) * std::exp(log_area), i);
+      by_value.emplace_back(OpacityAt(map, i) * std::exp(log_area), i);
     }
   }
   const std::size_t excess = by_value.size() - max_gaussians;

@@ -11,8 +11,8 @@ void FreeSpace::Remember(const Keyframe& keyframe) {
 std::vector<std::uint8_t> FreeSpace::FindMoved(std::span<const Eigen::Vector3f> points,
                                                const SE3& T_map_points,
                                                ThreadPool& pool) const {
-  std::vector<int> balance(points.size(), 0);  // of keyframes that saw through and those that saw
-  std::vector<int> through(points.size(), 0);
+  std::vector<int> seen(points.size(), 0);
+  std::vector<int> seen_through(points.size(), 0);
   for (const Sight& sight : sights_) {
     const SE3 T_sensor_points = sight.T_sensor_map * T_map_points;
     const Eigen::Matrix3f rotation = T_sensor_points.RotationMatrix().cast<float>();
@@ -23,17 +23,16 @@ std::vector<std::uint8_t> FreeSpace::FindMoved(std::span<const Eigen::Vector3f> 
         const std::optional<Pixel> pixel = sensor_.Project(p);
         if (!pixel) continue;
         if (Sees(sight.range_m, *pixel, p.norm())) {
-          --balance[i];
+          ++seen[i];
         } else if (SeesThrough(sight.range_m, *pixel, p.norm())) {
-          ++balance[i];
-          ++through[i];
+          ++seen_through[i];
         }
       }
     });
   }
   std::vector<std::uint8_t> moved(points.size(), 0);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    moved[i] = through[i] >= config_.min_seen_through && balance[i] > 0;
+    moved[i] = seen_through[i] >= config_.min_seen_through && seen_through[i] > seen[i];
   }
   return moved;
 }

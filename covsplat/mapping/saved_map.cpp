@@ -66,10 +66,6 @@ Eigen::Vector3f NormalOf(const GaussianColumns<float>& gaussians, std::size_t ro
   return RotationOf(gaussians, row) * Eigen::Vector3f::UnitZ();
 }
 
-float OpacityOf(const GaussianColumns<float>& gaussians, std::size_t row) {
-  return 1.0f / (1.0f + std::exp(-gaussians.Column(kOpacityLogit)[row]));
-}
-
 void SetRow(SavedMap& map,
             std::size_t row,
             const Eigen::Vector3f& mean,

@@ -43,9 +43,6 @@ SavedMap SelectRows(const SavedMap& map, std::span<const std::size_t> rows);
 
 Eigen::Vector3f NormalOf(const GaussianColumns<float>& gaussians, std::size_t row);
 
-/// In [0, 1].
-float OpacityOf(const GaussianColumns<float>& gaussians, std::size_t row);
-
 /// Sets row `row` from a 3D Gaussian: the thinnest of its axes becomes the normal.
 void SetRow(SavedMap& map,
             std::size_t row,

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "covsplat/core/percentile.hpp"
+
 namespace covsplat {
 namespace {
 
@@ -12,13 +14,6 @@ constexpr double kWeightLinear = 0.55;
 constexpr double kWeightCurvature = 0.30;
 constexpr double kWeightResidual = 0.15;
 constexpr std::size_t kMinMatched = 16;
-
-/// Percentile by nearest rank; `values` is reordered.
-double Percentile(std::vector<double>& values, double share) {
-  const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + rank, values.end());
-  return values[static_cast<std::size_t>(rank)];
-}
 
 /// Maps [low, high] to [0, 1] and clips.
 struct Normalisation {

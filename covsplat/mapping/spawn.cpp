@@ -158,8 +158,6 @@ void Append(const Eigen::Vector3f& mean,
             float intensity,
             const SpawnConfig& config,
             SpawnedGaussians& spawned) {
-  const std::size_t i = spawned.gaussians.Size();
-  spawned.gaussians.Resize(i + 1);
   const Eigen::Matrix3f axes = config.mode == SpawnMode::kIdentity
                                    ? FacingAxes(Eigen::Matrix3f::Identity(), mean)
                                    : measured_axes;
@@ -171,16 +169,14 @@ void Append(const Eigen::Vector3f& mean,
   // Paper eq. 8.
   const double share = HasFixedOpacity(config.mode) ? 0.5 : u;
   const double opacity = config.min_opacity + (config.max_opacity - config.min_opacity) * share;
-  WriteGaussian(spawned.gaussians,
-                i,
-                mean,
-                Eigen::Quaternionf(axes).normalized(),
-                {static_cast<float>(std::log(scales[0])), static_cast<float>(std::log(scales[1]))},
-                static_cast<float>(std::log(opacity / (1.0 - opacity))));
-  spawned.signals.push_back({.confidence = static_cast<float>(u),
-                             .control_score = control_score,
-                             .density = density,
-                             .intensity = intensity});
+  spawned.Add(mean,
+              axes,
+              {static_cast<float>(std::log(scales[0])), static_cast<float>(std::log(scales[1]))},
+              static_cast<float>(std::log(opacity / (1.0 - opacity))),
+              {.confidence = static_cast<float>(u),
+               .control_score = control_score,
+               .density = density,
+               .intensity = intensity});
 }
 
 /// Control score of the surface that the keyframe shows in a pixel, NaN where it shows none.
@@ -245,6 +241,18 @@ std::vector<PosedPoints> WithSweep(const TrackedScan& tracked) {
 }
 
 }  // namespace
+
+void SpawnedGaussians::Add(const Eigen::Vector3f& mean,
+                           const Eigen::Matrix3f& axes,
+                           const Eigen::Vector2f& log_scale,
+                           float opacity_logit,
+                           const GaussianSignals& known) {
+  const std::size_t i = gaussians.Size();
+  gaussians.Resize(i + 1);
+  const Eigen::Quaternionf rotation = Eigen::Quaternionf(axes).normalized();
+  WriteGaussian(gaussians, i, mean, rotation, log_scale, opacity_logit);
+  signals.push_back(known);
+}
 
 PatchFit FitPatches(const Keyframe& keyframe,
                     std::span<const Disc> existing_sensor,

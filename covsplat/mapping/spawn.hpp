@@ -107,6 +107,12 @@ struct SpawnConfig {
 struct SpawnedGaussians {
   GaussianColumns<float> gaussians;
   std::vector<GaussianSignals> signals;  ///< [N]
+
+  void Add(const Eigen::Vector3f& mean,
+           const Eigen::Matrix3f& axes,
+           const Eigen::Vector2f& log_scale,
+           float opacity_logit,
+           const GaussianSignals& known);
 };
 
 /// Patches through all scans since the last keyframe where they lie dense enough; nothing if

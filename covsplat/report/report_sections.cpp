@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "covsplat/core/percentile.hpp"
 #include "covsplat/report/format.hpp"
 #include "covsplat/report/html.hpp"
 
@@ -74,10 +75,7 @@ Series PerScan(const std::vector<double>& values, double scale, int color) {
 }
 
 double Quantile(std::vector<double> values, double share) {
-  if (values.empty()) return std::nan("");
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
+  return values.empty() ? std::nan("") : Percentile(values, share);
 }
 
 std::vector<double> FiniteOnly(std::vector<double> values) {

@@ -60,6 +60,11 @@ inline Eigen::Quaternionf RotationOf(const GaussianColumns<float>& gaussians, st
           gaussians.Column(kQuatZ)[row]};
 }
 
+/// In [0, 1].
+inline float OpacityOf(const GaussianColumns<float>& gaussians, std::size_t row) {
+  return 1.0f / (1.0f + std::exp(-gaussians.Column(kOpacityLogit)[row]));
+}
+
 template <class S>
 void WritePose(GaussianColumns<S>& gaussians,
                std::size_t row,

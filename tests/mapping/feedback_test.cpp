@@ -36,20 +36,10 @@ SpawnedGaussians Spawned(const std::vector<Surfel>& surfels) {
   return spawned;
 }
 
-Keyframe Blind(const SE3& T_map_sensor) {
-  const SensorModel sensor = ReducedSensor();
-  Keyframe keyframe;
-  keyframe.tracked.T_map_sensor = T_map_sensor;
-  keyframe.measurement = {
-      Image<float>(sensor.Rows(), sensor.Columns(), 0.0f),
-      Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::Zero())};
-  return keyframe;
-}
-
 class BuildTargetTest : public ::testing::Test {
  protected:
   void Add(const std::vector<Surfel>& surfels, const SE3& T_map_keyframe = SE3()) {
-    map_.AddKeyframe(Blind(T_map_keyframe), Spawned(surfels));
+    map_.AddKeyframe(SphereKeyframe(T_map_keyframe, 0.0f), Spawned(surfels));
   }
   std::shared_ptr<const RegistrationTarget> Build(const FeedbackConfig& config = {},
                                                   const SE3& T_map_sensor = SE3()) {
@@ -100,7 +90,7 @@ TEST_F(BuildTargetTest, LeavesOutWhatHasNotBeenSeenForLong) {
   EXPECT_EQ(Build({.max_keyframe_age = 2})->Size(), 3u);
   // Seeing a Gaussian again keeps it.
   const SensorModel sensor = ReducedSensor();
-  Keyframe ahead = Blind(SE3());
+  Keyframe ahead = SphereKeyframe(SE3(), 0.0f);
   for (int row = 0; row < sensor.Rows(); ++row) {
     ahead.measurement.range_m(row, sensor.Columns() / 2) = 5.0f;
   }
@@ -140,7 +130,7 @@ TEST_F(BuildTargetTest, IsAsPreciseFarFromTheOriginAsNearIt) {
   Add(surfels, near);
   const auto at_home = Build({}, near);
   GaussianMap remote(std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()));
-  remote.AddKeyframe(Blind(far), Spawned(surfels));
+  remote.AddKeyframe(SphereKeyframe(far, 0.0f), Spawned(surfels));
   const auto abroad = BuildTarget(remote, far, kReach, {});
   ASSERT_EQ(at_home->Size(), surfels.size());
   ASSERT_EQ(abroad->Size(), surfels.size());

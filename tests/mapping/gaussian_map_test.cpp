@@ -50,21 +50,10 @@ SpawnedGaussians GaussiansAt(const std::vector<Eigen::Vector3d>& places) {
   return spawned;
 }
 
-/// A keyframe that measured the same range in every pixel.
-Keyframe Sphere(const SE3& T_map_sensor, float range_m) {
-  const SensorModel sensor = ReducedSensor();
-  Keyframe keyframe;
-  keyframe.tracked.T_map_sensor = T_map_sensor;
-  keyframe.measurement = {
-      Image<float>(sensor.Rows(), sensor.Columns(), range_m),
-      Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::Zero())};
-  return keyframe;
-}
-
 class GaussianMapTest : public ::testing::Test {
  protected:
   int Add(int first, int count) {
-    return map_.AddKeyframe(Sphere(SE3(), 5.0f), Tagged(first, count));
+    return map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), Tagged(first, count));
   }
 
   void ExpectAlignedRows() {
@@ -134,9 +123,9 @@ TEST_F(GaussianMapTest, PrunesGaussiansThatAreNoLongerFinite) {
     broken.gaussians.Column(p)[p] = p % 2 == 0 ? std::numeric_limits<float>::quiet_NaN()
                                                : std::numeric_limits<float>::infinity();
   }
-  map_.AddKeyframe(Sphere(SE3(), 5.0f), broken);
-  map_.AddKeyframe(Sphere(SE3(), 5.0f), spawned);
-  map_.MarkSeen(1, Sphere(SE3(), 5.0f), sensor_);  // must survive them
+  map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), broken);
+  map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), spawned);
+  map_.MarkSeen(1, SphereKeyframe(SE3(), 5.0f), sensor_);  // must survive them
   for (const Disc& disc : map_.Near(SE3(), 10.0).discs) {
     EXPECT_TRUE(disc.mean.allFinite() && disc.u.allFinite() && disc.v.allFinite());
   }
@@ -147,10 +136,11 @@ TEST_F(GaussianMapTest, PrunesGaussiansThatAreNoLongerFinite) {
 
 TEST_F(GaussianMapTest, MarksAsSeenOnlyWhatAKeyframeMeasuresInItsPlace) {
   const SE3 first = MakePose(0, 0, 0.5, 10, -4, 1);
-  map_.AddKeyframe(Sphere(first, 5.0f), GaussiansAt({{5, 0, 0}, {0, 5, 0}, {8, 0, 0}, {3, 0, 0}}));
+  map_.AddKeyframe(SphereKeyframe(first, 5.0f),
+                   GaussiansAt({{5, 0, 0}, {0, 5, 0}, {8, 0, 0}, {3, 0, 0}}));
   // 1 m on and turned half round: only the first Gaussian is 4 m away.
   const SE3 second = first * MakePose(0, 0, std::numbers::pi, 1, 0, 0);
-  const Keyframe keyframe = Sphere(second, 4.0f);
+  const Keyframe keyframe = SphereKeyframe(second, 4.0f);
   const int number = map_.AddKeyframe(keyframe, {});
   map_.MarkSeen(number, keyframe, sensor_);
   EXPECT_EQ(LastSeen(0), 1);
@@ -160,20 +150,21 @@ TEST_F(GaussianMapTest, MarksAsSeenOnlyWhatAKeyframeMeasuresInItsPlace) {
 }
 
 TEST_F(GaussianMapTest, PrunesWhatKeyframesInARowSeeThrough) {
-  map_.AddKeyframe(Sphere(SE3(), 5.0f), GaussiansAt({{5, 0, 0}, {3, 0, 0}, {6, 0, 0}}));
-  map_.MarkSeen(0, Sphere(SE3(), 5.0f), sensor_);  // the second is in front, the third behind
+  map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), GaussiansAt({{5, 0, 0}, {3, 0, 0}, {6, 0, 0}}));
+  map_.MarkSeen(
+      0, SphereKeyframe(SE3(), 5.0f), sensor_);  // the second is in front, the third behind
   EXPECT_EQ(map_.PruneSeenThrough(2), 0u);
-  map_.MarkSeen(0, Sphere(SE3(), 3.0f), sensor_);  // now it is where it was: it counts anew
-  map_.MarkSeen(0, Sphere(SE3(), 5.0f), sensor_);
+  map_.MarkSeen(0, SphereKeyframe(SE3(), 3.0f), sensor_);  // now it is where it was: it counts anew
+  map_.MarkSeen(0, SphereKeyframe(SE3(), 5.0f), sensor_);
   EXPECT_EQ(map_.PruneSeenThrough(2), 0u);
-  map_.MarkSeen(0, Sphere(SE3(), 5.0f), sensor_);
+  map_.MarkSeen(0, SphereKeyframe(SE3(), 5.0f), sensor_);
   EXPECT_EQ(map_.PruneSeenThrough(2), 1u);
   EXPECT_EQ(map_.Size(), 2u);
 }
 
 TEST_F(GaussianMapTest, FindsDiscsAroundAPoseInItsFrame) {
   const SE3 keyframe = MakePose(0, 0, 0.5, 1000, -400, 1);
-  map_.AddKeyframe(Sphere(keyframe, 5.0f), GaussiansAt({{5, 0, 0}, {0, 15, 0}}));
+  map_.AddKeyframe(SphereKeyframe(keyframe, 5.0f), GaussiansAt({{5, 0, 0}, {0, 15, 0}}));
   const SE3 pose = keyframe * MakePose(0, 0, std::numbers::pi, 1, 0, 0);
   const NearGaussians near = map_.Near(pose, 10.0);
   ASSERT_EQ(near.discs.size(), 1u);  // no padding, nothing from farther away
@@ -186,12 +177,13 @@ TEST_F(GaussianMapTest, FindsDiscsAroundAPoseInItsFrame) {
 }
 
 TEST_F(GaussianMapTest, DoesNotMarkAsSeenWhatIsBehindAGapOrOutOfView) {
-  map_.AddKeyframe(Sphere(SE3(), 5.0f), GaussiansAt({{5, 0, 0}, {0.1, 0, 5}}));
-  map_.AddKeyframe(Sphere(SE3(), 0.0f), {});
-  map_.MarkSeen(1, Sphere(SE3(), 0.0f), sensor_);  // no returns at all
-  map_.MarkSeen(1, Sphere(SE3(), 4.7f), sensor_);  // something in front, beyond the tolerance
+  map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), GaussiansAt({{5, 0, 0}, {0.1, 0, 5}}));
+  map_.AddKeyframe(SphereKeyframe(SE3(), 0.0f), {});
+  map_.MarkSeen(1, SphereKeyframe(SE3(), 0.0f), sensor_);  // no returns at all
+  map_.MarkSeen(
+      1, SphereKeyframe(SE3(), 4.7f), sensor_);  // something in front, beyond the tolerance
   EXPECT_EQ(LastSeen(0), 0);
-  map_.MarkSeen(1, Sphere(SE3(), 4.9f), sensor_);  // within 10 cm + 2 %
+  map_.MarkSeen(1, SphereKeyframe(SE3(), 4.9f), sensor_);  // within 10 cm + 2 %
   EXPECT_EQ(LastSeen(0), 1);
   EXPECT_EQ(LastSeen(1), 0) << "nearly straight above";
 }

@@ -37,19 +37,11 @@ SpawnedGaussians Wall(float control_score, double opacity = 0.8, double distance
   return wall;
 }
 
-Keyframe Blind(const SE3& T_map_sensor) {
-  const SensorModel sensor = ReducedSensor();
-  Keyframe keyframe;
-  keyframe.tracked.T_map_sensor = T_map_sensor;
-  keyframe.measurement = {
-      Image<float>(sensor.Rows(), sensor.Columns(), 0.0f),
-      Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::Zero())};
-  return keyframe;
-}
-
 class ManageMapTest : public ::testing::Test {
  protected:
-  void Add(const SpawnedGaussians& spawned) { map_.AddKeyframe(Blind(pose_), spawned); }
+  void Add(const SpawnedGaussians& spawned) {
+    map_.AddKeyframe(SphereKeyframe(pose_, 0.0f), spawned);
+  }
   void Manage(const ManageConfig& config) { ManageMap(map_, pose_, kReach, kExtentFactor, config); }
   RenderOutput Render() { return map_.Engine().Render(pose_); }
   struct Means {
@@ -163,7 +155,7 @@ TEST_F(ManageMapTest, CoversAPlaneOnceAndLeavesItThenToNewGaussians) {
 TEST_F(ManageMapTest, KeepsCoversInTheNewestKeyframeOfTheirMembers) {
   SpawnedGaussians left = Wall(0.1f);
   Add(left);
-  map_.AddKeyframe(Blind(pose_ * MakePose(0, 0, 0.1, 0, 1.6, 0)), {});
+  map_.AddKeyframe(SphereKeyframe(pose_ * MakePose(0, 0, 0.1, 0, 1.6, 0), 0.0f), {});
   const SE3 back = map_.KeyframePose(1).Inverse() * pose_;
   SpawnedGaussians right;
   right = Wall(0.1f);

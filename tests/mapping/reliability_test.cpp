@@ -8,17 +8,6 @@
 namespace covsplat::test {
 namespace {
 
-/// A keyframe that measured the same range in every pixel.
-Keyframe Sphere(const SE3& T_map_sensor, float range_m) {
-  const SensorModel sensor = ReducedSensor();
-  Keyframe keyframe;
-  keyframe.tracked.T_map_sensor = T_map_sensor;
-  keyframe.measurement = {
-      Image<float>(sensor.Rows(), sensor.Columns(), range_m),
-      Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::UnitX())};
-  return keyframe;
-}
-
 class FreeSpaceTest : public ::testing::Test {
  protected:
   static constexpr int kRemembered = 4;
@@ -39,9 +28,9 @@ TEST_F(FreeSpaceTest, NothingHasMovedBeforeAnythingWasSeen) {
 
 TEST_F(FreeSpaceTest, WhatStandsWhereSeveralKeyframesSawThroughHasMoved) {
   FreeSpace space = Make();
-  space.Remember(Sphere(SE3(), 8.0f));
+  space.Remember(SphereKeyframe(SE3(), 8.0f));
   EXPECT_FALSE(HasMoved(space, {5, 0, 0})) << "one may be wrong";
-  space.Remember(Sphere(SE3(), 8.0f));
+  space.Remember(SphereKeyframe(SE3(), 8.0f));
   EXPECT_TRUE(HasMoved(space, {5, 0, 0}));
   EXPECT_FALSE(HasMoved(space, {8.1f, 0, 0})) << "what they saw";
   EXPECT_FALSE(HasMoved(space, {12, 0, 0})) << "hidden behind it";
@@ -51,8 +40,8 @@ TEST_F(FreeSpaceTest, WhatStandsWhereSeveralKeyframesSawThroughHasMoved) {
 TEST_F(FreeSpaceTest, PlacesAreThoseOfTheMapWhereverTheSensorHasBeen) {
   FreeSpace space = Make();
   const SE3 then = MakePose(0, 0, 0.5, 100, -40, 1);
-  space.Remember(Sphere(then, 8.0f));
-  space.Remember(Sphere(then, 8.0f));
+  space.Remember(SphereKeyframe(then, 8.0f));
+  space.Remember(SphereKeyframe(then, 8.0f));
   const SE3 now = then * MakePose(0, 0, 1.0, 2, 0, 0);
   const SE3 T_now_then = now.Inverse() * then;
   const auto seen_now = [&](double x_then) {
@@ -64,26 +53,26 @@ TEST_F(FreeSpaceTest, PlacesAreThoseOfTheMapWhereverTheSensorHasBeen) {
 
 TEST_F(FreeSpaceTest, WhatMoreKeyframesHaveSeenThanSeenThroughStays) {
   FreeSpace space = Make();
-  space.Remember(Sphere(SE3(), 8.0f));
-  space.Remember(Sphere(SE3(), 8.0f));
-  space.Remember(Sphere(SE3(), 5.0f));
+  space.Remember(SphereKeyframe(SE3(), 8.0f));
+  space.Remember(SphereKeyframe(SE3(), 8.0f));
+  space.Remember(SphereKeyframe(SE3(), 5.0f));
   EXPECT_TRUE(HasMoved(space, {5, 0, 0}));
-  space.Remember(Sphere(SE3(), 5.0f));
+  space.Remember(SphereKeyframe(SE3(), 5.0f));
   EXPECT_FALSE(HasMoved(space, {5, 0, 0})) << "two against two: a thin thing, or one that rests";
 }
 
 TEST_F(FreeSpaceTest, KeyframesAreForgotten) {
   FreeSpace space = Make();
-  space.Remember(Sphere(SE3(), 8.0f));
-  space.Remember(Sphere(SE3(), 8.0f));
-  for (int k = 1; k < kRemembered; ++k) space.Remember(Sphere(SE3(), 0.0f));
+  space.Remember(SphereKeyframe(SE3(), 8.0f));
+  space.Remember(SphereKeyframe(SE3(), 8.0f));
+  for (int k = 1; k < kRemembered; ++k) space.Remember(SphereKeyframe(SE3(), 0.0f));
   EXPECT_FALSE(HasMoved(space, {5, 0, 0}));
 }
 
 TEST_F(FreeSpaceTest, SwitchedOffNothingMoves) {
   FreeSpace space = Make(false);
-  space.Remember(Sphere(SE3(), 8.0f));
-  space.Remember(Sphere(SE3(), 8.0f));
+  space.Remember(SphereKeyframe(SE3(), 8.0f));
+  space.Remember(SphereKeyframe(SE3(), 8.0f));
   EXPECT_FALSE(HasMoved(space, {5, 0, 0}));
 }
 

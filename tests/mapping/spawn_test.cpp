@@ -36,10 +36,6 @@ double ScaleOf(const GaussianColumns<float>& table, std::size_t i, int axis) {
   return std::exp(static_cast<double>(table.Column(kLogScaleU + axis)[i]));
 }
 
-double OpacityOf(const GaussianColumns<float>& table, std::size_t i) {
-  return 1.0 / (1.0 + std::exp(-static_cast<double>(table.Column(kOpacityLogit)[i])));
-}
-
 Cell CellOfPoint(const Eigen::Vector3f& p, double voxel_m) {
   const auto scaled = (p / static_cast<float>(voxel_m)).array().floor().cast<int>().eval();
   return {scaled[0], scaled[1], scaled[2]};

@@ -58,6 +58,17 @@ inline Keyframe StillKeyframe(const RayScene& scene,
                       pool);
 }
 
+/// A keyframe of ReducedSensor() that measured the same range in every pixel, 0: nothing.
+inline Keyframe SphereKeyframe(const SE3& T_map_sensor, float range_m) {
+  const SensorModel sensor = ReducedSensor();
+  Keyframe keyframe;
+  keyframe.tracked.T_map_sensor = T_map_sensor;
+  keyframe.measurement = {
+      Image<float>(sensor.Rows(), sensor.Columns(), range_m),
+      Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::Zero())};
+  return keyframe;
+}
+
 /// True ranges of the sensor's rays from a pose, 0 where there is nothing in its reach.
 inline Image<float> TrueRanges(const RayScene& scene, const SensorModel& sensor, const SE3& pose) {
   Image<float> ranges(sensor.Rows(), sensor.Columns(), 0.0f);
