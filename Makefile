@@ -1,6 +1,6 @@
 # The short way to everything; CMake presets do the work.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test cuda bench bench-peers bench-ablation oracles check-map format tidy docs clean
+.PHONY: help setup demo test cuda bench bench-peers bench-ablation bench-growth oracles check-map format tidy docs clean
 
 COVSPLAT_DATA ?= ../shared/data
 THREADS ?= 2
@@ -11,7 +11,7 @@ ONLY ?=
 
 help:  ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1\t\2/' | \
-	  awk -F '\t' '{printf "  make %-11s %s\n", $$1, $$2}'
+	  awk -F '\t' '{printf "  make %-14s %s\n", $$1, $$2}'
 
 setup:  ## Install the Debian packages that are missing
 	@tools/setup.sh
@@ -62,6 +62,13 @@ bench-peers: setup build-release .venv/peers $(addprefix simulate-,$(WORLDS))  #
 bench-ablation: setup build-release .venv/peers  ## Run the paper's ablations (hours): docs/benchmarks.md
 	PYTHONPATH=bench/peers .venv/bin/python bench/ablation/run.py --covsplat build/release/apps/covsplat --out bench_out/ablation \
 	  $(if $(ONLY),--only '$(ONLY)',--update docs/benchmarks.md)
+
+bench_out/street-laps: | build-release
+	build/release/apps/covsplat simulate street $(SENSOR_street) --laps 4 -o $@ --overwrite
+
+bench-growth: setup build-release .venv/peers bench_out/street-laps  ## Four times round the streets: docs/benchmarks.md
+	PYTHONPATH=bench/peers .venv/bin/python bench/growth/run.py --covsplat build/release/apps/covsplat \
+	  --recording bench_out/street-laps --out bench_out/growth --update docs/benchmarks.md
 
 .venv/oracles: tools/oracles/requirements.txt
 	@tools/setup.sh --with-python

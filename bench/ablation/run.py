@@ -58,7 +58,7 @@ def main() -> int:
             found.setdefault((job.world.name, job.variant), []).append(measures)
             print(f"{job.world.name} {job.seed} {job.variant.name}: {measures}", flush=True)
     about = page.circumstances(shlex.join(sys.argv), load_before)
-    text = heading(about) + "".join(tables(table, list(worlds), found) for table in TABLES)
+    text = page.heading(about) + "".join(tables(table, list(worlds), found) for table in TABLES)
     if options.update is not None:
         page.update(options.update, "ablation", text)
     print("\n" + text)
@@ -103,11 +103,6 @@ def simulate(covsplat: Path, job: Job) -> None:
     command = [str(covsplat), "simulate", job.world.name, "--sensor", "os1-64"]
     command += ["--motion", "walking", "--seed", str(job.seed), "-o", str(folder)]
     run_program([*command, "--overwrite", "--quiet"])
-
-
-def heading(about: dict[str, object]) -> str:
-    place = f"commit {about['commit']}, {about['cpu']}, {about['cores']} cores"
-    return f"{about['date']}, {place}.\n\n`PYTHONPATH=bench/peers python3 {about['command']}`\n"
 
 
 def tables(table: Table, worlds: list[str], found: Found) -> str:

@@ -72,6 +72,12 @@ def circumstances(command: str, load_before: tuple[float, float, float]) -> dict
     }
 
 
+def heading(about: dict[str, object]) -> str:
+    """Of what other benchmarks than this one measured."""
+    place = f"commit {about['commit']}, {about['cpu']}, {about['cores']} cores"
+    return f"{about['date']}, {place}.\n\n`PYTHONPATH=bench/peers python3 {about['command']}`\n"
+
+
 def markdown(results: Results, about: dict[str, object]) -> str:
     versions = ", ".join(f"{name} {number}" for name, number in dict(about["versions"]).items())
     text = (

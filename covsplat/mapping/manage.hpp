@@ -24,7 +24,7 @@ struct EnumNames<ManageMode> {
 };
 
 struct SplitConfig {
-  double control_quantile = 0.95;
+  double control_quantile = 0.98;
   double min_opacity = 0.3;
   double min_scale_m = 0.1;
   double max_share = 0.0005;

@@ -6,7 +6,7 @@
 namespace covsplat {
 namespace {
 
-constexpr std::size_t kNearKeyframes = 8;
+constexpr std::size_t kNearViews = 8;
 
 /// `gone`: ascending indices.
 std::vector<Disc> Without(std::span<const std::size_t> gone, std::span<const Disc> discs) {
@@ -38,7 +38,7 @@ Mapper::Mapper(std::unique_ptr<SplatEngine> engine,
 void Mapper::Insert(Keyframe keyframe) {
   MaskMoved(keyframe);
   Spawn(keyframe);
-  if (map_.Keyframes() % config_.manage.interval == 0) Manage(keyframe.tracked.T_map_sensor);
+  if (map_.Keyframes() % config_.manage.interval == 0) Manage();
 }
 
 void Mapper::MaskMoved(Keyframe& keyframe) {
@@ -75,14 +75,62 @@ void Mapper::Spawn(const Keyframe& keyframe) {
   const SpawnedGaussians spawned =
       SpawnGaussians(keyframe, fit, render ? &*render : nullptr, staying, sensor_, config_.spawn);
   const int number = map_.AddKeyframe(keyframe, spawned);
+  AddView(number);
   map_.MarkSeen(number, keyframe, sensor_);
   map_.PruneSeenThrough(config_.manage.prune_seen_through);
 }
 
-void Mapper::Manage(const SE3& T_map_sensor) {
+std::vector<int> Mapper::Views() const {
+  std::vector<int> keyframes;
+  for (const View& view : views_) keyframes.push_back(view.keyframe);
+  return keyframes;
+}
+
+double Mapper::Distance(const View& a, const View& b) const {
+  return (map_.KeyframePose(a.keyframe).Translation() - map_.KeyframePose(b.keyframe).Translation())
+      .norm();
+}
+
+void Mapper::AddView(int keyframe) {
+  View view{keyframe, 0.0};
+  if (!views_.empty()) {
+    view.travelled_m = views_.back().travelled_m + Distance(views_.back(), view);
+    ThinViews();
+  }
+  views_.push_back(view);
+}
+
+/// The newest view is to become an older one. Of those from about the same place the first of a
+/// pass stays, and of several passes the last.
+void Mapper::ThinViews() {
+  constexpr double kSamePass = 3.0;  // in spacings of the way
+  const double spacing_m = config_.schedule.view_spacing_m;
+  const View newest = views_.back();
+  views_.pop_back();
+  const auto is_near = [&](const View& view) { return Distance(view, newest) < spacing_m; };
+  const bool is_known = std::ranges::any_of(views_, [&](const View& view) {
+    return is_near(view) && newest.travelled_m - view.travelled_m < kSamePass * spacing_m;
+  });
+  if (is_known) {
+    map_.Engine().DropView(newest.keyframe);
+    return;
+  }
+  std::erase_if(views_, [&](const View& view) {
+    if (!is_near(view)) return false;
+    map_.Engine().DropView(view.keyframe);
+    return true;
+  });
+  views_.push_back(newest);
+}
+
+void Mapper::Manage() {
   const ScopedTimer timer(times_, "manage");
-  ManageMap(
-      map_, T_map_sensor, sensor_.MaxRange(), config_.spawn.patches.extent_factor, config_.manage);
+  ManageMap(map_,
+            map_.KeyframePose(map_.Keyframes() - 1),
+            sensor_.MaxRange(),
+            config_.spawn.patches.extent_factor,
+            config_.manage);
+  managed_keyframes_ = map_.Keyframes();
 }
 
 void Mapper::Visit(int keyframe, int steps) {
@@ -96,43 +144,41 @@ void Mapper::Visit(int keyframe, int steps) {
 }
 
 void Mapper::OptimizeNewest() {
-  if (map_.Keyframes() == 0) return;
+  if (views_.empty()) return;
   const ScheduleConfig& schedule = config_.schedule;
-  Visit(map_.Keyframes() - 1, schedule.steps_new);
-  Visit(RandomNearKeyframe(), schedule.steps_near);
-  Visit(static_cast<int>(rng_.Below(static_cast<std::uint64_t>(map_.Keyframes()))),
-        schedule.steps_old);
+  Visit(views_.back().keyframe, schedule.steps_new);
+  Visit(RandomNearView(), schedule.steps_near);
+  Visit(RandomView(), schedule.steps_old);
 }
 
 void Mapper::OptimizeHurriedly() {
-  if (map_.Keyframes() > 0) Visit(map_.Keyframes() - 1, config_.schedule.steps_hurried);
+  if (!views_.empty()) Visit(views_.back().keyframe, config_.schedule.steps_hurried);
 }
 
 void Mapper::OptimizeIdle() {
-  if (map_.Keyframes() == 0) return;
-  const auto all = static_cast<std::uint64_t>(map_.Keyframes());
+  if (views_.empty()) return;
   const bool near = rng_.Uniform() < 0.5;
-  Visit(near ? RandomNearKeyframe() : static_cast<int>(rng_.Below(all)),
-        config_.schedule.steps_per_visit);
+  Visit(near ? RandomNearView() : RandomView(), config_.schedule.steps_per_visit);
 }
 
-void Mapper::OptimizeFinally() {
-  if (map_.Keyframes() == 0) return;
-  const auto all = static_cast<std::uint64_t>(map_.Keyframes());
+void Mapper::Conclude() {
+  if (views_.empty()) return;
+  if (managed_keyframes_ < map_.Keyframes()) Manage();
   for (int left = config_.schedule.final_steps; left > 0;
        left -= config_.schedule.steps_per_visit) {
-    Visit(static_cast<int>(rng_.Below(all)), std::min(left, config_.schedule.steps_per_visit));
+    Visit(RandomView(), std::min(left, config_.schedule.steps_per_visit));
   }
 }
 
-int Mapper::RandomNearKeyframe() {
-  const Eigen::Vector3d here = map_.KeyframePose(map_.Keyframes() - 1).Translation();
+int Mapper::RandomView() { return views_[rng_.Below(views_.size())].keyframe; }
+
+int Mapper::RandomNearView() {
   std::vector<std::pair<double, int>> by_distance;
-  by_distance.reserve(static_cast<std::size_t>(map_.Keyframes()));
-  for (int k = 0; k < map_.Keyframes(); ++k) {
-    by_distance.emplace_back((map_.KeyframePose(k).Translation() - here).norm(), k);
+  by_distance.reserve(views_.size());
+  for (const View& view : views_) {
+    by_distance.emplace_back(Distance(view, views_.back()), view.keyframe);
   }
-  const std::size_t near = std::min(by_distance.size(), kNearKeyframes);
+  const std::size_t near = std::min(by_distance.size(), kNearViews);
   std::partial_sort(by_distance.begin(),
                     by_distance.begin() + static_cast<std::ptrdiff_t>(near),
                     by_distance.end());

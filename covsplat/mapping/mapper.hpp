@@ -17,15 +17,14 @@ struct ScheduleConfig {
   int steps_hurried = 3;
   int steps_per_visit = 10;
   int final_steps = 0;
+  double view_spacing_m = 1.0;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
     v.Field("steps_new", c.steps_new, Range{0, 10000}, "optimiser steps on each new keyframe");
-    v.Field("steps_near",
-            c.steps_near,
-            Range{0, 10000},
-            "... then on one of the keyframes nearest to it");
-    v.Field("steps_old", c.steps_old, Range{0, 10000}, "... then on one of all keyframes");
+    v.Field(
+        "steps_near", c.steps_near, Range{0, 10000}, "... then on one of the views nearest to it");
+    v.Field("steps_old", c.steps_old, Range{0, 10000}, "... then on one of all views");
     v.Field("steps_hurried",
             c.steps_hurried,
             Range{0, 10000},
@@ -38,6 +37,11 @@ struct ScheduleConfig {
             c.final_steps,
             Range{0, 10000000},
             "steps over all keyframes when the recording has ended");
+    v.Field("view_spacing_m",
+            c.view_spacing_m,
+            Range{0.0, 100.0},
+            "views nearer than this to another one are forgotten: memory is bounded by the places "
+            "that were seen, not by time");
   }
 };
 
@@ -79,8 +83,8 @@ class Mapper {
   void OptimizeHurriedly();
   /// One visit of a view for idle time: the newest ones more often than old ones.
   void OptimizeIdle();
-  /// `schedule.final_steps` over all keyframes.
-  void OptimizeFinally();
+  /// When the recording has ended: a last round of management, and `schedule.final_steps`.
+  void Conclude();
 
   /// The registration target around a pose.
   std::shared_ptr<const RegistrationTarget> MakeTarget(const SE3& T_map_sensor);
@@ -90,22 +94,35 @@ class Mapper {
   RenderOutput Render(const SE3& T_map_sensor) { return map_.Engine().Render(T_map_sensor); }
 
   std::int64_t Steps() const { return steps_; }
+  /// Keyframes whose measurements are still there to optimise by; the last is the newest.
+  std::vector<int> Views() const;
   /// Time since the last call, by stage.
   StageTimes TakeTimes() { return std::exchange(times_, {}); }
 
  private:
+  struct View {
+    int keyframe;
+    double travelled_m;  ///< from the first keyframe to this one
+  };
+
+  double Distance(const View& a, const View& b) const;
   void MaskMoved(Keyframe& keyframe);
   PatchFit FindPatches(const Keyframe& keyframe, const NearGaussians& near) const;
   void Spawn(const Keyframe& keyframe);
-  void Manage(const SE3& T_map_sensor);
+  void AddView(int keyframe);
+  void ThinViews();
+  void Manage();
   void Visit(int keyframe, int steps);
-  int RandomNearKeyframe();
+  int RandomView();
+  int RandomNearView();
 
   const SensorModel sensor_;
   const MapperConfig config_;
   ThreadPool& pool_;
   GaussianMap map_;
   FreeSpace free_space_;
+  std::vector<View> views_;    ///< oldest first
+  int managed_keyframes_ = 0;  ///< there were at the last round of management
   Rng rng_{20250711};
   std::int64_t steps_ = 0;
   StageTimes times_;

@@ -12,7 +12,7 @@
 namespace covsplat {
 
 struct PlaneCoverConfig {
-  double control_quantile = 0.95;
+  double control_quantile = 0.98;
   double min_opacity = 0.3;
   double cell_m = 0.8;
   int passes = 3;

@@ -204,7 +204,7 @@ void SlamSystem::Finish() {
   keyframes_.Close();
   if (mapper_thread_.joinable()) mapper_thread_.join();
   AddTimes(mapper_times_, last_times);
-  mapper_.OptimizeFinally();
+  mapper_.Conclude();
   AddTimes(mapper_times_, mapper_.TakeTimes());
   gaussians_ = mapper_.Map().Size();
   mapper_steps_ = mapper_.Steps();

@@ -74,6 +74,8 @@ class SplatEngine {
 
   /// Makes an anchor's measurement a training view (one for each anchor; a second replaces it).
   virtual void SetView(int anchor, const RangeMeasurement& measurement) = 0;
+  /// Frees an anchor's view, which then takes no steps any more.
+  virtual void DropView(int anchor) = 0;
 
   virtual RenderOutput Render(const SE3& T_map_sensor) = 0;
   /// One step of the optimiser on an anchor's view. `surface_normals`: with the N_surf term.

@@ -62,7 +62,7 @@ TEST_F(MapperTest, LeavesGaussiansAloneWhenTheMapIsFrozen) {
   config.schedule.final_steps = 20;
   const auto mapper = MapTheRoom(config);
   mapper->OptimizeIdle();
-  mapper->OptimizeFinally();
+  mapper->Conclude();
   EXPECT_EQ(mapper->Steps(), 0);
   const GaussianMap& map = mapper->Map();
   ASSERT_GT(map.Size(), 1000u);
@@ -83,7 +83,7 @@ TEST_F(MapperTest, SpendsItsBudgetAndNoMore) {
   const auto mapper = MakeMapper(config);
   mapper->OptimizeNewest();
   mapper->OptimizeIdle();
-  mapper->OptimizeFinally();
+  mapper->Conclude();
   EXPECT_EQ(mapper->Steps(), 0) << "there is nothing to optimise yet";
   mapper->Insert(KeyframeAt(0));
   EXPECT_EQ(mapper->Steps(), 0);
@@ -91,8 +91,45 @@ TEST_F(MapperTest, SpendsItsBudgetAndNoMore) {
   EXPECT_EQ(mapper->Steps(), 6);
   mapper->OptimizeIdle();
   EXPECT_EQ(mapper->Steps(), 10);
-  mapper->OptimizeFinally();
+  mapper->Conclude();
   EXPECT_EQ(mapper->Steps(), 20) << "10 in visits of 4, 4 and 2";
+}
+
+TEST_F(MapperTest, KeepsOneViewOfAPlace) {
+  MapperConfig config;
+  config.schedule.view_spacing_m = 1.0;
+  const auto mapper = MakeMapper(config);
+  const auto go_to = [&](double x_m, int seed) {
+    mapper->Insert(StillKeyframe(Room(),
+                                 sensor_,
+                                 MakePose(0, 0, 0, x_m, 0, 0),
+                                 kNoise,
+                                 static_cast<std::uint64_t>(seed),
+                                 pool_));
+    mapper->OptimizeNewest();
+    return mapper->Views();
+  };
+  using Views = std::vector<int>;
+  EXPECT_EQ(go_to(0.0, 0), (Views{0}));
+  EXPECT_EQ(go_to(0.7, 1), (Views{0, 1})) << "the newest stays until the next";
+  EXPECT_EQ(go_to(1.4, 2), (Views{0, 2}));
+  EXPECT_EQ(go_to(4.0, 3), (Views{0, 2, 3}));
+  EXPECT_EQ(go_to(0.2, 4), (Views{0, 2, 3, 4}));
+  EXPECT_EQ(go_to(2.0, 5), (Views{2, 3, 4, 5})) << "a second time round, the first goes";
+  mapper->OptimizeIdle();
+  mapper->Conclude();
+}
+
+TEST_F(MapperTest, ManagesOnceMoreWhenTheRecordingHasEnded) {
+  MapperConfig config = Frozen();
+  config.manage.max_gaussians = 500;
+  config.manage.interval = 100;
+  const auto mapper = MakeMapper(config);
+  mapper->Conclude();
+  mapper->Insert(KeyframeAt(0));
+  EXPECT_GT(mapper->Map().Size(), 500u);
+  mapper->Conclude();
+  EXPECT_EQ(mapper->Map().Size(), 500u);
 }
 
 TEST_F(MapperTest, RemembersHowGaussiansWereSpawned) {

@@ -153,6 +153,7 @@ TEST(CoverPlanes, NeverJoinsWhatIsNotOnePlane) {
   const auto apart = [&](const PlanarGaussian& other) { return Cover({here, other}).empty(); };
   EXPECT_TRUE(apart(Rectangle({0.6f, 0, 1.2f}, 0.3f, 0.3f))) << "20 cm above";
   EXPECT_TRUE(apart(Rectangle({0, 0, 1.2f}, 0.3f, 0.3f)));
+  EXPECT_TRUE(apart(Rectangle({0, 0, 1.04f}, 0.3f, 0.3f))) << "4 cm above, on the average 2 cm";
   const Eigen::Quaternionf over(
       Eigen::AngleAxisf(std::numbers::pi_v<float>, Eigen::Vector3f::UnitX()));
   PlanarGaussian back = Rectangle({0.6f, 0, -1}, 0.3f, 0.3f, over);
@@ -171,6 +172,15 @@ TEST(CoverPlanes, DoesNotBridgeAGapHoweverManyLieUponEachOther) {
   ASSERT_EQ(covers.size(), 1u);
   EXPECT_EQ(covers[0].members, (std::vector<std::size_t>{0, 1, 2, 3, 4, 5}));
   EXPECT_NEAR(covers[0].disc.u.norm() * kEdge, 0.1f, 1e-5f);
+}
+
+TEST(CoverPlanes, ReachesAsFarAsItsMembersHoweverManyLieAtOneEnd) {
+  std::vector<PlanarGaussian> gaussians(3, Rectangle({0, 0, 1}, 0.1f, 0.1f));
+  gaussians.push_back(Rectangle({0.2f, 0, 1}, 0.1f, 0.1f));
+  const std::vector<PlaneCover> covers = Cover(gaussians);
+  ASSERT_EQ(covers.size(), 1u);
+  EXPECT_TRUE(IsIn(covers[0].disc, {-0.08f, 0, 1}));
+  EXPECT_TRUE(IsIn(covers[0].disc, {0.28f, 0, 1}));
 }
 
 TEST(CoverPlanes, LeavesWindowsOpen) {

@@ -93,6 +93,28 @@ TEST(SplatEngine, SameBitsForAnyNumberOfThreads) {
   }
 }
 
+TEST(SplatEngine, KeepingRowsJoinsTheRangesOfAnAnchor) {
+  ThreadPool pool(1);
+  const auto engine = MakeEngine(pool);
+  const GaussianColumns<float> room = NoisyRoom(RoomSensor(), RoomMeasurement(RoomSensor()));
+  engine->AddAnchor(SE3());
+  engine->AddAnchor(SE3());
+  for (const int anchor : {0, 1, 0}) engine->Append(anchor, room);
+  const AnchorRange second_of_0 = engine->Ranges()[2];
+  std::vector<std::uint8_t> keep(engine->Gaussians().Size(), 1);
+  keep[0] = 0;
+  const std::vector<std::size_t> old_row = engine->Keep(keep);
+  ASSERT_EQ(engine->Ranges().size(), 2u);
+  const AnchorRange& of_0 = engine->Ranges()[0];
+  EXPECT_EQ(of_0.anchor, 0);
+  EXPECT_EQ(of_0.end - of_0.begin, 2 * room.Size() - 1);
+  EXPECT_EQ(old_row[of_0.begin], 1u);
+  EXPECT_EQ(old_row[of_0.end - 1], second_of_0.end - 1);
+  EXPECT_EQ(engine->Ranges()[1].anchor, 1);
+  EXPECT_EQ(engine->Ranges()[1].end - engine->Ranges()[1].begin, room.Size());
+  EXPECT_EQ(MeanOf(engine->Gaussians(), of_0.end - 1), MeanOf(room, room.Size() - 1));
+}
+
 TEST(SplatEngine, AMovedAnchorTakesItsGaussiansAlong) {
   ThreadPool pool(1);
   ExpectAMovedAnchorTakesItsGaussiansAlong(*MakeEngine(pool));

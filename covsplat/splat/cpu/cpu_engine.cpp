@@ -78,6 +78,11 @@ void CpuEngine::SetView(int anchor, const RangeMeasurement& measurement) {
   if (current_view_ == anchor) current_view_ = -1;
 }
 
+void CpuEngine::DropView(int anchor) {
+  views_[static_cast<std::size_t>(anchor)] = CompactView();
+  if (current_view_ == anchor) current_view_ = -1;
+}
+
 void CpuEngine::LookFrom(const SE3& T_map_sensor) {
   current_view_ = -1;
   rasterizer_.LookFrom(T_map_sensor, gaussians_, ranges_, T_map_anchor_);

@@ -187,6 +187,12 @@ void CudaEngine::SetView(int anchor, const RangeMeasurement& measurement) {
   if (current_view_ == anchor) current_view_ = -1;
 }
 
+void CudaEngine::DropView(int anchor) {
+  stream_.Wait();  // for steps on it
+  views_[static_cast<std::size_t>(anchor)] = TrainingView();
+  if (current_view_ == anchor) current_view_ = -1;
+}
+
 SceneJob CudaEngine::Scene() {
   return {.view = view_,
           .gaussians = gaussians_.Table(),

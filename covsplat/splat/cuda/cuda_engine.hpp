@@ -27,6 +27,7 @@ class CudaEngine final : public SplatEngine {
   const GaussianColumns<float>& Gaussians() const override;
   const std::vector<AnchorRange>& Ranges() const override { return ranges_; }
   void SetView(int anchor, const RangeMeasurement& measurement) override;
+  void DropView(int anchor) override;
   RenderOutput Render(const SE3& T_map_sensor) override;
   StepReport Step(int anchor, bool surface_normals) override;
 

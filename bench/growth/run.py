@@ -1,0 +1,135 @@
+"""How map, memory and time grow with the way, several times round the same streets.
+
+PYTHONPATH=bench/peers .venv/bin/python bench/growth/run.py --covsplat build/release/apps/covsplat \
+    --recording bench_out/street-laps
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import os
+import shlex
+import statistics
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import page
+import report
+from processes import run_program
+
+TRACKING = ("preprocess", "align", "deskew")
+MAPPING = ("keyframe", "optimize", "target")  # keyframe contains the other stages
+HEADER = (
+    "way m",
+    "scans",
+    "keyframes",
+    "Gaussians",
+    "resident MiB",
+    "target surfels",
+    "tracking ms/scan",
+    "mapping ms/scan",
+    "ATE so far mm",
+)
+
+
+@dataclass(frozen=True)
+class Scan:
+    way_m: float
+    is_keyframe: bool
+    gaussians: int
+    rss_mib: float
+    target_surfels: int
+    tracking_ms: float
+    mapping_ms: float
+
+
+def main() -> int:
+    options = parse()
+    load_before = os.getloadavg()
+    command = [str(options.covsplat), "run", str(options.recording), "-o", str(options.out)]
+    run_program([*command, "--deterministic", "--overwrite", "--quiet"])
+    scans = scans_of(options.out)
+    parts = [
+        [scan for scan in scans if begin <= scan.way_m < begin + options.part_m]
+        for begin in np.arange(0.0, scans[-1].way_m, options.part_m)
+    ]
+    errors = errors_after(options, [len(part) for part in parts])
+    rows = [row(part, error_m) for part, error_m in zip(parts, errors, strict=True)]
+    about = page.circumstances(shlex.join(sys.argv), load_before)
+    text = page.heading(about) + "\n" + report.table(HEADER, rows) + "\n"
+    if options.update is not None:
+        page.update(options.update, "growth", text)
+    print("\n" + text)
+    return 0
+
+
+def parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--covsplat", type=Path, required=True, help="the binary")
+    parser.add_argument("--recording", type=Path, required=True, help="with its truth")
+    parser.add_argument("--part-m", type=float, default=250.0, help="way that a row stands for")
+    parser.add_argument("--out", type=Path, default=Path("bench_out/growth"))
+    parser.add_argument("--update", type=Path, metavar="PAGE", help="write between its markers")
+    return parser.parse_args()
+
+
+def scans_of(run: Path) -> list[Scan]:
+    positions_m = np.loadtxt(run / "trajectory_tum.txt")[:, 1:4]
+    steps_m = np.linalg.norm(np.diff(positions_m, axis=0), axis=1)
+    way_m = np.concatenate([[0.0], np.cumsum(steps_m)])
+    with (run / "frames.csv").open(newline="") as lines:
+        frames = list(csv.DictReader(lines))
+    if len(frames) != len(way_m):
+        raise SystemExit(f"{run}: {len(frames)} scans were tracked, {len(way_m)} have poses")
+    return [scan_of(frame, float(way)) for frame, way in zip(frames, way_m, strict=True)]
+
+
+def scan_of(frame: dict[str, str], way_m: float) -> Scan:
+    total_ms = lambda stages: sum(float(frame[f"{stage}_ms"]) for stage in stages)  # noqa: E731
+    return Scan(
+        way_m,
+        frame["keyframe"] == "1",
+        int(frame["gaussians"]),
+        int(frame["rss_bytes"]) / 2**20,
+        int(frame["target_surfels"]),
+        total_ms(TRACKING),
+        total_ms(MAPPING),
+    )
+
+
+def errors_after(options: argparse.Namespace, lengths: list[int]) -> list[float]:
+    """ATE of the trajectory's beginning, up to the end of each part."""
+    lines = (options.out / "trajectory_tum.txt").read_text().splitlines(keepends=True)
+    beginning = options.out / "beginning_tum.txt"
+    truth = str(options.recording / "gt_tum.txt")
+    errors = []
+    for end in np.cumsum(lengths):
+        beginning.write_text("".join(lines[:end]))
+        command = [str(options.covsplat), "eval", "traj", str(beginning), truth, "--json"]
+        errors.append(json.loads(run_program(command).stdout)["ate_translation_m"]["rmse"])
+    beginning.unlink()
+    return errors
+
+
+def row(part: list[Scan], error_m: float) -> list[str]:
+    last = part[-1]
+    return [
+        f"{last.way_m:.0f}",
+        str(len(part)),
+        str(sum(scan.is_keyframe for scan in part)),
+        str(last.gaussians),
+        f"{last.rss_mib:.0f}",
+        str(last.target_surfels),
+        f"{statistics.mean(scan.tracking_ms for scan in part):.1f}",
+        f"{statistics.mean(scan.mapping_ms for scan in part):.1f}",
+        f"{1e3 * error_m:.1f}",
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
