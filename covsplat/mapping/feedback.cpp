@@ -23,6 +23,7 @@ bool IsTrackable(const GaussianMap& map, std::size_t row, const FeedbackConfig& 
   const GaussianSignals& signals = map.Signals()[row];
   const float opacity = OpacityOf(map.Engine().Gaussians(), row);
   return signals.trackable && signals.last_seen >= map.Keyframes() - 1 - config.max_keyframe_age &&
+         signals.seen_through <= config.max_seen_through &&
          opacity >= static_cast<float>(config.min_opacity) &&
          opacity * signals.confidence >= static_cast<float>(config.min_confidence);
 }

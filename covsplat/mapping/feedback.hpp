@@ -49,6 +49,7 @@ struct FeedbackConfig {
   int max_keyframe_age = 100;
   double min_opacity = 0.01;
   double min_confidence = 0.0;
+  int max_seen_through = 0;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
@@ -63,12 +64,17 @@ struct FeedbackConfig {
             c.min_confidence,
             Range{0.0, 1.0},
             "least gamma = opacity * confidence of trackable Gaussians");
+    v.Field("max_seen_through",
+            c.max_seen_through,
+            Range{0, 1000000},
+            "nor are those that more than so many keyframes in a row have seen through: what they "
+            "show may have moved on");
   }
 };
 
 /// Gaussians with m_i = 1, k_i >= k_min and alpha_i >= alpha_min (paper eq. 1) within reach of a
-/// pose, with the weights that matches with them have. Positions are relative to the pose, rounded
-/// to metres.
+/// pose that have not been seen through, with the weights that matches with them have. Positions
+/// are relative to the pose, rounded to metres.
 std::shared_ptr<const RegistrationTarget> BuildTarget(const GaussianMap& map,
                                                       const SE3& T_map_sensor,
                                                       double reach_m,

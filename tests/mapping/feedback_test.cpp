@@ -98,6 +98,18 @@ TEST_F(BuildTargetTest, LeavesOutWhatHasNotBeenSeenForLong) {
   EXPECT_EQ(Build(one_keyframe)->Size(), 2u);
 }
 
+TEST_F(BuildTargetTest, LeavesOutWhatWasSeenThroughUntilItIsSeenAgain) {
+  Add({{.mean = {5, 0, 0}}, {.mean = {0, 8, 0}}});
+  const SensorModel sensor = ReducedSensor();
+  map_.MarkSeen(0, SphereKeyframe(SE3(), 8.0f), sensor);
+  ASSERT_EQ(Build()->Size(), 1u);
+  EXPECT_EQ(Build()->At(0).mean.y(), 8.0f);
+  EXPECT_EQ(Build({.max_seen_through = 1})->Size(), 2u);
+  EXPECT_EQ(Build({.mode = FeedbackMode::kNoFilter})->Size(), 2u);
+  map_.MarkSeen(0, SphereKeyframe(SE3(), 5.0f), sensor);
+  EXPECT_EQ(Build()->Size(), 2u);
+}
+
 TEST_F(BuildTargetTest, ReachesAroundThePose) {
   Add({{.mean = {kReach - 1, 0, 0}}, {.mean = {kReach + 1, 0, 0}}});
   EXPECT_EQ(Build()->Size(), 1u);
