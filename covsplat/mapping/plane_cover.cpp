@@ -32,6 +32,8 @@ struct Piece {
   double FullArea() const {
     return 4.0 * kEdgeSigmas * kEdgeSigmas * std::sqrt(variance[0] * variance[1]);
   }
+  /// The longer standard deviation, with all members covered.
+  double Reach() const { return variance.head<2>().cwiseSqrt().cwiseProduct(expansion).maxCoeff(); }
   double Weight() const { return area_m2 * -std::expm1(log_clear); }
 };
 
@@ -102,6 +104,13 @@ Eigen::Vector2d ExpansionOf(const Piece& piece, const CoverJob& job) {
           std::max(1.0, ShareWithin(distances[1], share))};
 }
 
+/// How long the longer standard deviation of two pieces together may be. If both are longer than
+/// what is wanted, they lie upon each other if they are no longer together.
+double MaxReach(const Piece& a, const Piece& b, const CoverJob& job) {
+  const double wanted_m = job.config->max_scale_m / job.extent_factor;
+  return std::min(a.Reach(), b.Reach()) > wanted_m ? std::max(a.Reach(), b.Reach()) : wanted_m;
+}
+
 /// Both pieces as one, if it is flat, small enough, and filled.
 std::optional<Piece> Joined(const Piece& a, const Piece& b, const CoverJob& job) {
   const PlaneCoverConfig& config = *job.config;
@@ -116,7 +125,7 @@ std::optional<Piece> Joined(const Piece& a, const Piece& b, const CoverJob& job)
   joined.mean = a.mean + share_b * between;
   joined.axes = eigen.vectors;
   joined.variance = eigen.values.cwiseMax(0.0);
-  const double max_sigma_m = config.max_scale_m / job.extent_factor;
+  const double max_sigma_m = MaxReach(a, b, job);
   const bool may_fit = joined.variance[2] <= config.flatness_m * config.flatness_m &&
                        joined.variance[0] <= max_sigma_m * max_sigma_m &&
                        area >= config.fill * joined.FullArea();
@@ -127,9 +136,7 @@ std::optional<Piece> Joined(const Piece& a, const Piece& b, const CoverJob& job)
   joined.members = a.members;
   joined.members.insert(joined.members.end(), b.members.begin(), b.members.end());
   joined.expansion = ExpansionOf(joined, job);
-  const Eigen::Vector2d sigma_m =
-      joined.variance.head<2>().cwiseSqrt().cwiseProduct(joined.expansion);
-  const bool fits = sigma_m.maxCoeff() <= max_sigma_m &&
+  const bool fits = joined.Reach() <= max_sigma_m &&
                     area >= config.fill * joined.expansion.prod() * joined.FullArea();
   return fits ? std::optional(std::move(joined)) : std::nullopt;
 }

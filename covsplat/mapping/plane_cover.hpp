@@ -48,7 +48,10 @@ struct PlaneCoverConfig {
             c.cover,
             Range{0.0, 1.0},
             "q_cover: it is made so large that this share of them lies within");
-    v.Field("max_scale_m", c.max_scale_m, Range{0.01, 10.0}, "largest scale it may get");
+    v.Field("max_scale_m",
+            c.max_scale_m,
+            Range{0.01, 10.0},
+            "it gets no larger than this, or, of larger ones upon each other, than the largest");
     v.Field("max_share",
             c.max_share,
             Range{0.0, 1.0},

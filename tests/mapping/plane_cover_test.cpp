@@ -204,6 +204,21 @@ TEST(CoverPlanes, MakesNoneLargerThanAllowed) {
   }
 }
 
+TEST(CoverPlanes, JoinsLargeOnesUponEachOtherWithoutGrowing) {
+  PlaneCoverConfig config = OneCell();
+  config.max_scale_m = 0.2;
+  const PlanarGaussian large = Rectangle({0, 0, 1}, 0.5f, 0.4f);
+  const PlanarGaussian detail = Rectangle({0.2f, 0.1f, 1}, 0.1f, 0.1f);
+  const std::vector<PlaneCover> covers =
+      Cover({large, Rectangle({0.02f, 0, 1}, 0.45f, 0.4f), detail}, config);
+  ASSERT_EQ(covers.size(), 1u);
+  EXPECT_EQ(covers[0].members, (std::vector<std::size_t>{0, 1}));
+  EXPECT_LE(covers[0].disc.u.norm(), large.disc.u.norm() + 1e-6f);
+  EXPECT_GT(covers[0].disc.u.norm(), 0.9f * large.disc.u.norm());
+  EXPECT_TRUE(Cover({large, Rectangle({0.5f, 0, 1}, 0.5f, 0.4f)}, config).empty())
+      << "half upon it";
+}
+
 TEST(CoverPlanes, RemovesTheMostRedundantIfNotAllMayGo) {
   std::vector<PlanarGaussian> gaussians = Tiles(2, 1, 0.1f, {-2, -2, 1});
   const std::vector<PlanarGaussian> many = Tiles(4, 1, 0.1f, {2, 2, 1});
