@@ -174,13 +174,15 @@ TEST(CoverPlanes, DoesNotBridgeAGapHoweverManyLieUponEachOther) {
   EXPECT_NEAR(covers[0].disc.u.norm() * kEdge, 0.1f, 1e-5f);
 }
 
-TEST(CoverPlanes, ReachesAsFarAsItsMembersHoweverManyLieAtOneEnd) {
-  std::vector<PlanarGaussian> gaussians(3, Rectangle({0, 0, 1}, 0.1f, 0.1f));
-  gaussians.push_back(Rectangle({0.2f, 0, 1}, 0.1f, 0.1f));
-  const std::vector<PlaneCover> covers = Cover(gaussians);
+TEST(CoverPlanes, ReachesAsFarAsItsMembers) {
+  PlaneCoverConfig config = OneCell();
+  config.fill = 0.5;
+  // Moments alone would end at 0.53 m.
+  const std::vector<PlaneCover> covers =
+      Cover({Rectangle({0, 0, 1}, 0.2f, 0.2f), Rectangle({0.5f, 0, 1}, 0.1f, 0.1f)}, config);
   ASSERT_EQ(covers.size(), 1u);
-  EXPECT_TRUE(IsIn(covers[0].disc, {-0.08f, 0, 1}));
-  EXPECT_TRUE(IsIn(covers[0].disc, {0.28f, 0, 1}));
+  EXPECT_TRUE(IsIn(covers[0].disc, {-0.16f, 0, 1}));
+  EXPECT_TRUE(IsIn(covers[0].disc, {0.575f, 0, 1}));
 }
 
 TEST(CoverPlanes, LeavesWindowsOpen) {
