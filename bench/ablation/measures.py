@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
 import shutil
@@ -10,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from covsplat_run import mesh_of_run, score_mesh
+from covsplat_run import TRACKING, ate_m, frames_of, mesh_of_run, score_mesh, stage_ms
 from processes import run_program
 from recording import Recording
 from variants import Variant
@@ -83,12 +82,10 @@ def evaluate(covsplat: Path, run: Path, recording: Path) -> Measures:
     score = score_mesh(
         covsplat, mesh, Recording.open(recording), (TAU_M, FINE_TAU_M), 1, trajectory
     )
-    track = [str(trajectory), str(recording / "gt_tum.txt")]
-    errors = json.loads(run_program([str(covsplat), "eval", "traj", *track, "--json"]).stdout)
     metrics = json.loads((run / "metrics.json").read_text())
-    frames = tracked_frames(run)
+    frames = [frame for frame in frames_of(run) if int(frame["iterations"]) > 0]
     return Measures(
-        ate_m=errors["ate_translation_m"]["rmse"],
+        ate_m=ate_m(covsplat, trajectory, recording / "gt_tum.txt"),
         accuracy_cm=score.paper.accuracy_cm,
         completeness_cm=score.paper.completeness_cm,
         chamfer_l1_cm=score.paper.chamfer_l1_cm,
@@ -97,20 +94,11 @@ def evaluate(covsplat: Path, run: Path, recording: Path) -> Measures:
         strict_f_fine_percent=score.strict.f_percent[FINE_TAU_M],
         gaussians=metrics["map"]["gaussians"],
         map_mb=metrics["map"]["file_bytes"] / 1e6,
-        tracking_scans_per_s=1e3 / mean(frames, tracking_ms),
+        tracking_scans_per_s=1e3 / mean(frames, lambda frame: stage_ms(frame, TRACKING)),
         iterations=mean(frames, lambda frame: float(frame["iterations"])),
         unmatched_percent=100.0 * mean(frames, unmatched),
         depth_error_cm=100.0 * metrics["held_out"]["after"]["mean_abs_m"],
     )
-
-
-def tracked_frames(run: Path) -> list[dict[str, str]]:
-    with (run / "frames.csv").open(newline="") as lines:
-        return [row for row in csv.DictReader(lines) if int(row["iterations"]) > 0]
-
-
-def tracking_ms(frame: dict[str, str]) -> float:
-    return sum(float(frame[f"{stage}_ms"]) for stage in ("preprocess", "align", "deskew"))
 
 
 def unmatched(frame: dict[str, str]) -> float:

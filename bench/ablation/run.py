@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import os
 import re
-import shlex
 import statistics
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -40,7 +39,6 @@ Found = dict[tuple[str, Variant], list[Measures]]
 
 def main() -> int:
     options = parse()
-    load_before = os.getloadavg()
     worlds = {name: scans for name, scans in map(world_and_scans, options.world)}
     jobs = [
         Job(World(name, options.out / f"{name}-{seed}" / "recording", scans), seed, variant)
@@ -57,11 +55,8 @@ def main() -> int:
         for job, measures in zip(jobs, pool.map(run, jobs), strict=True):
             found.setdefault((job.world.name, job.variant), []).append(measures)
             print(f"{job.world.name} {job.seed} {job.variant.name}: {measures}", flush=True)
-    about = page.circumstances(shlex.join(sys.argv), load_before)
-    text = page.heading(about) + "".join(tables(table, list(worlds), found) for table in TABLES)
-    if options.update is not None:
-        page.update(options.update, "ablation", text)
-    print("\n" + text)
+    text = "".join(tables(table, list(worlds), found) for table in TABLES)
+    page.publish(text, "ablation", options.update)
     return 0
 
 
@@ -98,7 +93,7 @@ def world_and_scans(text: str) -> tuple[str, int | None]:
 
 def simulate(covsplat: Path, job: Job) -> None:
     folder = job.world.folder
-    if (folder / "gt_mesh.ply").is_file():
+    if (folder / "gt_tum.txt").is_file():  # written last
         return
     command = [str(covsplat), "simulate", job.world.name, "--sensor", "os1-64"]
     command += ["--motion", "walking", "--seed", str(job.seed), "-o", str(folder)]

@@ -7,10 +7,6 @@ PYTHONPATH=bench/peers .venv/bin/python bench/growth/run.py --covsplat build/rel
 from __future__ import annotations
 
 import argparse
-import csv
-import json
-import os
-import shlex
 import statistics
 import sys
 from dataclasses import dataclass
@@ -20,9 +16,9 @@ import numpy as np
 
 import page
 import report
+from covsplat_run import TRACKING, ate_m, frames_of, stage_ms
 from processes import run_program
 
-TRACKING = ("preprocess", "align", "deskew")
 MAPPING = ("keyframe", "optimize", "target")  # keyframe contains the other stages
 HEADER = (
     "way m",
@@ -50,7 +46,6 @@ class Scan:
 
 def main() -> int:
     options = parse()
-    load_before = os.getloadavg()
     command = [str(options.covsplat), "run", str(options.recording), "-o", str(options.out)]
     run_program([*command, "--deterministic", "--overwrite", "--quiet"])
     scans = scans_of(options.out)
@@ -60,11 +55,7 @@ def main() -> int:
     ]
     errors = errors_after(options, [len(part) for part in parts])
     rows = [row(part, error_m) for part, error_m in zip(parts, errors, strict=True)]
-    about = page.circumstances(shlex.join(sys.argv), load_before)
-    text = page.heading(about) + "\n" + report.table(HEADER, rows) + "\n"
-    if options.update is not None:
-        page.update(options.update, "growth", text)
-    print("\n" + text)
+    page.publish(f"\n{report.table(HEADER, rows)}\n", "growth", options.update)
     return 0
 
 
@@ -82,23 +73,21 @@ def scans_of(run: Path) -> list[Scan]:
     positions_m = np.loadtxt(run / "trajectory_tum.txt")[:, 1:4]
     steps_m = np.linalg.norm(np.diff(positions_m, axis=0), axis=1)
     way_m = np.concatenate([[0.0], np.cumsum(steps_m)])
-    with (run / "frames.csv").open(newline="") as lines:
-        frames = list(csv.DictReader(lines))
+    frames = frames_of(run)
     if len(frames) != len(way_m):
         raise SystemExit(f"{run}: {len(frames)} scans were tracked, {len(way_m)} have poses")
     return [scan_of(frame, float(way)) for frame, way in zip(frames, way_m, strict=True)]
 
 
 def scan_of(frame: dict[str, str], way_m: float) -> Scan:
-    total_ms = lambda stages: sum(float(frame[f"{stage}_ms"]) for stage in stages)  # noqa: E731
     return Scan(
         way_m,
         frame["keyframe"] == "1",
         int(frame["gaussians"]),
         int(frame["rss_bytes"]) / 2**20,
         int(frame["target_surfels"]),
-        total_ms(TRACKING),
-        total_ms(MAPPING),
+        stage_ms(frame, TRACKING),
+        stage_ms(frame, MAPPING),
     )
 
 
@@ -106,12 +95,11 @@ def errors_after(options: argparse.Namespace, lengths: list[int]) -> list[float]
     """ATE of the trajectory's beginning, up to the end of each part."""
     lines = (options.out / "trajectory_tum.txt").read_text().splitlines(keepends=True)
     beginning = options.out / "beginning_tum.txt"
-    truth = str(options.recording / "gt_tum.txt")
+    truth = options.recording / "gt_tum.txt"
     errors = []
     for end in np.cumsum(lengths):
         beginning.write_text("".join(lines[:end]))
-        command = [str(options.covsplat), "eval", "traj", str(beginning), truth, "--json"]
-        errors.append(json.loads(run_program(command).stdout)["ate_translation_m"]["rmse"])
+        errors.append(ate_m(options.covsplat, beginning, truth))
     beginning.unlink()
     return errors
 

@@ -12,6 +12,8 @@ from processes import Finished, run_program
 from recording import Recording
 from se3 import Trajectory
 
+TRACKING = ("preprocess", "align", "deskew")
+
 
 def run_covsplat(
     binary: Path, recording: Recording, out: Path, threads: int, *, mapping: bool
@@ -38,13 +40,26 @@ def run_covsplat(
     )
 
 
+def frames_of(out: Path) -> list[dict[str, str]]:
+    """Of a run, what became of each scan."""
+    with (out / "frames.csv").open(newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def stage_ms(frame: dict[str, str], stages: tuple[str, ...]) -> float:
+    return sum(float(frame[f"{stage}_ms"]) for stage in stages)
+
+
 def track_times(out: Path) -> list[float]:
-    path = out / "frames.csv"
-    with path.open(newline="") as lines:
-        rows = list(csv.DictReader(lines))
+    rows = frames_of(out)
     if not rows or "track_ms" not in rows[0]:
-        raise RuntimeError(f"{path}: no column track_ms")
+        raise RuntimeError(f"{out / 'frames.csv'}: no column track_ms")
     return [float(row["track_ms"]) for row in rows]
+
+
+def ate_m(binary: Path, trajectory: Path, truth: Path) -> float:
+    command = [str(binary), "eval", "traj", str(trajectory), str(truth), "--json"]
+    return json.loads(run_program(command).stdout)["ate_translation_m"]["rmse"]
 
 
 def scans_per_s(out: Path) -> float | None:

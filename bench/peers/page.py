@@ -5,7 +5,9 @@ from __future__ import annotations
 import importlib.metadata
 import json
 import os
+import shlex
 import subprocess
+import sys
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -72,10 +74,14 @@ def circumstances(command: str, load_before: tuple[float, float, float]) -> dict
     }
 
 
-def heading(about: dict[str, object]) -> str:
-    """Of what other benchmarks than this one measured."""
+def publish(text: str, block: str, path: Path | None) -> None:
+    """What a benchmark of covsplat alone found: prints it and, with a page, writes its block."""
+    about = circumstances("PYTHONPATH=bench/peers python3 " + shlex.join(sys.argv), os.getloadavg())
     place = f"commit {about['commit']}, {about['cpu']}, {about['cores']} cores"
-    return f"{about['date']}, {place}.\n\n`PYTHONPATH=bench/peers python3 {about['command']}`\n"
+    text = f"{about['date']}, {place}.\n\n`{about['command']}`\n{text}"
+    if path is not None:
+        update(path, block, text)
+    print("\n" + text)
 
 
 def markdown(results: Results, about: dict[str, object]) -> str:

@@ -130,7 +130,6 @@ void Mapper::Manage() {
             sensor_.MaxRange(),
             config_.spawn.patches.extent_factor,
             config_.manage);
-  managed_keyframes_ = map_.Keyframes();
 }
 
 void Mapper::Visit(int keyframe, int steps) {
@@ -163,7 +162,7 @@ void Mapper::OptimizeIdle() {
 
 void Mapper::Conclude() {
   if (views_.empty()) return;
-  if (managed_keyframes_ < map_.Keyframes()) Manage();
+  if (map_.Keyframes() % config_.manage.interval != 0) Manage();
   for (int left = config_.schedule.final_steps; left > 0;
        left -= config_.schedule.steps_per_visit) {
     Visit(RandomView(), std::min(left, config_.schedule.steps_per_visit));

@@ -36,7 +36,7 @@ struct ScheduleConfig {
     v.Field("final_steps",
             c.final_steps,
             Range{0, 10000000},
-            "steps over all keyframes when the recording has ended");
+            "steps over all views when the recording has ended");
     v.Field("view_spacing_m",
             c.view_spacing_m,
             Range{0.0, 100.0},
@@ -121,8 +121,7 @@ class Mapper {
   ThreadPool& pool_;
   GaussianMap map_;
   FreeSpace free_space_;
-  std::vector<View> views_;    ///< oldest first
-  int managed_keyframes_ = 0;  ///< there were at the last round of management
+  std::vector<View> views_;  ///< oldest first
   Rng rng_{20250711};
   std::int64_t steps_ = 0;
   StageTimes times_;

@@ -93,6 +93,20 @@ TEST(SplatEngine, SameBitsForAnyNumberOfThreads) {
   }
 }
 
+TEST(SplatEngine, ADroppedViewTakesNoMoreSteps) {
+  ThreadPool pool(1);
+  const auto engine = MakeEngine(pool);
+  const RangeMeasurement m = RoomMeasurement(RoomSensor());
+  engine->AddAnchor(SE3());
+  engine->Append(0, NoisyRoom(RoomSensor(), m));
+  engine->SetView(0, m);
+  engine->Step(0, false);
+  engine->DropView(0);
+  EXPECT_DEATH(engine->Step(0, false), "");
+  engine->SetView(0, m);
+  EXPECT_GT(engine->Step(0, false).range_loss, 0.0);
+}
+
 TEST(SplatEngine, KeepingRowsJoinsTheRangesOfAnAnchor) {
   ThreadPool pool(1);
   const auto engine = MakeEngine(pool);
