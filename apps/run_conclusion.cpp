@@ -22,8 +22,9 @@ Result<void> MeasureMap(SlamSystem& system, const SlamConfig& config, RunResults
       map, map.AsSpawned(), config.system.backend, system.Sensor(), config.mapper.engine, pool);
   if (!spawned) return Forward(spawned);
   for (const HeldOut& scan : system.HeldOuts()) {
-    RenderOutput before = (*spawned)->Render(scan.T_map_sensor);
-    RenderOutput after = system.GetMapper().Render(scan.T_map_sensor);
+    const SE3 T_map_sensor = system.PoseOf(scan.scan);
+    RenderOutput before = (*spawned)->Render(T_map_sensor);
+    RenderOutput after = system.GetMapper().Render(T_map_sensor);
     HeldOutResult result;
     result.scan = scan.scan;
     result.before = MeasureHeldOut(scan.range_m, before.range_m);

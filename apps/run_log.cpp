@@ -14,6 +14,7 @@ constexpr std::array kStages = {"preprocess",
                                 "align",
                                 "deskew",
                                 "wait",
+                                "loops",
                                 "keyframe",
                                 "reliability",
                                 "insert",
@@ -84,47 +85,68 @@ Result<RunLog> RunLog::Open(const std::filesystem::path& folder, const ScanSelec
   return RunLog(scans, std::move(*tum), std::move(*kitti), std::move(*frames));
 }
 
-Result<void> RunLog::Append(const ScanRecord& record, std::int64_t rss_bytes) {
-  const TimedPose pose = {record.stamp_s, record.T_map_sensor};
+PoseRows::Text PoseRows::Next(const ScanRecord& record) {
+  const TimedPose next = {record.stamp_s, record.T_map_sensor};
   const std::int64_t row = (record.scan - scans_.first) / scans_.jump;
-  return FillGap(row - rows_, pose)
-      .and_then([&] { return tum_.Append(TumLine(pose)); })
-      .and_then([&] { return kitti_.Append(KittiLine(pose.T_world_sensor)); })
-      .and_then([&] { return frames_.Append(Row(record, rss_bytes)); })
-      .map([&] {
-        rows_ = row + 1;
-        last_ = pose;
-      });
-}
-
-// In one piece, so that a killed run does not end in the middle of a gap.
-Result<void> RunLog::FillGap(std::int64_t rows, const TimedPose& next) {
-  if (rows <= 0) return {};
-  std::string tum;
-  std::string kitti;
-  for (std::int64_t i = 1; i <= rows; ++i) {
+  const std::int64_t left_out = row - rows_;
+  Text text;
+  for (std::int64_t i = 1; i <= left_out; ++i) {
     TimedPose pose = next;
     if (last_) {
-      const double share = static_cast<double>(i) / static_cast<double>(rows + 1);
+      const double share = static_cast<double>(i) / static_cast<double>(left_out + 1);
       pose.stamp_s = last_->stamp_s + share * (next.stamp_s - last_->stamp_s);
       pose.T_world_sensor = Interpolate(last_->T_world_sensor, next.T_world_sensor, share);
-      tum += TumLine(pose);
+      text.tum += TumLine(pose);
     }
-    kitti += KittiLine(pose.T_world_sensor);
+    text.kitti += KittiLine(pose.T_world_sensor);
   }
-  return tum_.Append(tum).and_then([&] { return kitti_.Append(kitti); });
+  text.tum += TumLine(next);
+  text.kitti += KittiLine(next.T_world_sensor);
+  rows_ = row + 1;
+  last_ = next;
+  return text;
 }
 
-Result<void> RunLog::FillTo(std::int64_t count) {
-  if (!last_) return {};
-  std::string kitti;
-  for (; rows_ < count; ++rows_) kitti += KittiLine(last_->T_world_sensor);
-  return kitti_.Append(kitti);
+PoseRows::Text PoseRows::FillTo(std::int64_t count) {
+  Text text;
+  if (!last_) return text;
+  for (; rows_ < count; ++rows_) text.kitti += KittiLine(last_->T_world_sensor);
+  return text;
+}
+
+Result<void> RunLog::Append(const ScanRecord& record, std::int64_t rss_bytes) {
+  return AppendPoses(rows_.Next(record)).and_then([&] {
+    return frames_.Append(Row(record, rss_bytes));
+  });
+}
+
+Result<void> RunLog::FillTo(std::int64_t count) { return AppendPoses(rows_.FillTo(count)); }
+
+// In one piece, so that a killed run does not end in the middle of a gap.
+Result<void> RunLog::AppendPoses(const PoseRows::Text& rows) {
+  return tum_.Append(rows.tum).and_then([&] { return kitti_.Append(rows.kitti); });
 }
 
 Result<void> RunLog::Close() {
   return tum_.Close().and_then([&] { return kitti_.Close(); }).and_then([&] {
     return frames_.Close();
+  });
+}
+
+Result<void> RewritePoses(const std::filesystem::path& folder,
+                          const ScanSelection& scans,
+                          std::span<const ScanRecord> records,
+                          std::int64_t count) {
+  PoseRows rows(scans);
+  PoseRows::Text all;
+  const auto add = [&](const PoseRows::Text& text) {
+    all.tum += text.tum;
+    all.kitti += text.kitti;
+  };
+  for (const ScanRecord& record : records) add(rows.Next(record));
+  add(rows.FillTo(count));
+  return WriteFileAtomically(folder / "trajectory_tum.txt", all.tum).and_then([&] {
+    return WriteFileAtomically(folder / "trajectory_kitti.txt", all.kitti);
   });
 }
 

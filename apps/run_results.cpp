@@ -143,6 +143,10 @@ std::string MetricsJson(const RunResults& results) {
         {"optimizer_steps", results.mapper_steps},
         {"file_bytes", results.map_bytes}}},
       {"held_out", HeldOutJson(results)}};
+  if (results.loops) {
+    json["loops"] = {{"accepted", results.loops->accepted},
+                     {"candidates", results.loops->candidates}};
+  }
   if (results.truth) json["ground_truth"] = results.truth->path.string();
   json["trajectory_error"] = results.error ? ErrorJson(*results.error) : Json(nullptr);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
@@ -170,6 +174,11 @@ std::string SummaryText(const RunResults& results) {
       count(results.gaussians),
       FormatBytes(results.map_bytes),
       count(results.keyframes));
+  if (results.loops) {
+    text += fmt::format("loops       {} of {} places that looked alike\n",
+                        results.loops->accepted,
+                        results.loops->candidates);
+  }
   if (const auto means = MeansOf(results.held_out)) {
     text += fmt::format("depth error {} as spawned, {} optimised (mean over {} held-out scans)\n",
                         FormatMetres(means->before.mean_abs_m),

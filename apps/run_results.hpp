@@ -31,6 +31,11 @@ struct MapPicture {
   Image<Rgb> image;
 };
 
+struct LoopCounts {
+  std::int64_t accepted = 0;
+  std::int64_t candidates = 0;  ///< pairs of places that were looked at
+};
+
 struct RunResults {
   std::filesystem::path recording;
   std::string title;   ///< of the report
@@ -49,6 +54,8 @@ struct RunResults {
   std::vector<FeedProblem> problems;
   double feed_s = 0.0;    ///< wall time from the first scan to the last
   double finish_s = 0.0;  ///< and from there until the map was at rest
+
+  std::optional<LoopCounts> loops;  ///< nothing if they were off
 
   std::size_t gaussians = 0;
   std::size_t keyframes = 0;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "apps/interrupt.hpp"
+#include "apps/loop_log.hpp"
 #include "apps/progress.hpp"
 #include "apps/run_conclusion.hpp"
 #include "apps/run_log.hpp"
@@ -112,6 +113,10 @@ ProgressStatus StatusOf(const Prepared& run, std::int64_t fed, std::int64_t lost
   return status;
 }
 
+bool IsComplete(const Prepared& run) {
+  return !run.results.interrupted && run.results.without_pose == 0;
+}
+
 /// Scan by scan until there are no more, a signal comes, or the disk is full.
 Result<void> FeedScans(Prepared& run, RunLog& log, Progress& progress) {
   std::int64_t fed = 0;
@@ -135,8 +140,7 @@ Result<void> FeedScans(Prepared& run, RunLog& log, Progress& progress) {
   }
   run.results.feed = run.feed->Counts();
   run.results.interrupted = Interrupted();
-  const bool complete = !run.results.interrupted && run.results.without_pose == 0;
-  const Result<void> filled = complete ? log.FillTo(run.scans) : Result<void>();
+  const Result<void> filled = IsComplete(run) ? log.FillTo(run.scans) : Result<void>();
   return filled.and_then([&] { return log.Close(); });
 }
 
@@ -144,8 +148,24 @@ double SecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// What loops made of the scans' poses, and how they came about.
+Result<void> TakeLoops(Prepared& run, const ScanSelection& scans) {
+  const LoopCloser* loops = run.system->Loops();
+  if (loops == nullptr) return {};
+  run.results.loops = {CountLoops(*loops, LoopFate::kAccepted),
+                       static_cast<std::int64_t>(loops->Loops().size())};
+  for (ScanRecord& record : run.results.records) {
+    record.T_map_sensor = run.system->PoseOf(record.scan);
+  }
+  const std::int64_t count = IsComplete(run) ? run.scans : 0;
+  return WriteLoops(run.folder, *loops, run.system->KeyframeScans()).and_then([&] {
+    return RewritePoses(run.folder, scans, run.results.records, count);
+  });
+}
+
 Result<void> Track(Prepared& run, const RunRequest& request) {
-  Result<RunLog> log = RunLog::Open(run.folder, {request.first_scan, request.jump});
+  const ScanSelection scans = {request.first_scan, request.jump};
+  Result<RunLog> log = RunLog::Open(run.folder, scans);
   if (!log) return Forward(log);
   Progress::Options options;
   options.quiet = request.quiet;
@@ -156,7 +176,7 @@ Result<void> Track(Prepared& run, const RunRequest& request) {
   const auto end = std::chrono::steady_clock::now();
   run.system->Finish();
   run.results.finish_s = SecondsSince(end);
-  return {};
+  return TakeLoops(run, scans);
 }
 
 Result<void> CheckUsable(const RunResults& results) {

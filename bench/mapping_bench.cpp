@@ -23,7 +23,7 @@ TrackedScan TrackedAt(int scan, ThreadPool& pool) {
   SourceCloud source = PreprocessStill(still, pool);
   TrackedScan tracked;
   tracked.scan = scan;
-  tracked.T_map_sensor = Courtyard().PoseOf(scan);
+  tracked.T_odom_sensor = Courtyard().PoseOf(scan);
   tracked.points = still.points;
   tracked.surface = std::move(source.points);
   tracked.covariance = std::move(source.covariance);

@@ -12,6 +12,7 @@ find_package(tl-expected 1.0 REQUIRED)
 find_package(embree 3 REQUIRED)
 find_package(assimp 5.2 REQUIRED)
 find_package(nanoflann 1.4 REQUIRED)
+find_package(OpenCVFeatures REQUIRED)
 
 # Only `mesh --method poisson` needs it.
 find_package(Open3D QUIET)

@@ -16,11 +16,12 @@ EDGES = {
     "sim": ["io"],
     "eval": ["io"],
     "config": [],
+    "loops": ["io", "registration"],
     "mapping": ["io", "registration", "splat"],
     "mesh": ["io", "splat"],
-    "slam": ["mapping", "registration", "splat"],
-    "report": ["eval", "io", "slam", "mapping", "splat"],
-    "apps": ["config", "eval", "io", "mapping", "mesh", "registration", "report", "sim", "slam",
+    "slam": ["loops", "mapping", "registration", "splat"],
+    "report": ["eval", "io", "loops", "slam", "mapping", "splat"],
+    "apps": ["config", "eval", "io", "loops", "mapping", "mesh", "registration", "report", "sim", "slam",
              "splat"],
 }
 INCLUDE = re.compile(r'#include\s+"covsplat/(\w+)/')

@@ -7,7 +7,7 @@ packages=(
   build-essential cmake ninja-build python3
   libeigen3-dev libfmt-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev libhwy-dev libembree-dev
   libassimp-dev libnanoflann-dev libpng-dev liblzf-dev zlib1g-dev libexpected-dev libgtest-dev
-  libbenchmark-dev
+  libbenchmark-dev libopencv-features2d-dev libceres-dev
 )
 for argument in "$@"; do
   case "$argument" in

@@ -35,6 +35,8 @@ void AddRunOptions(CLI::App& command, RunOptions& o) {
   command.add_option("--threads", o.threads, "Threads in all; default: one per processor")
       ->check(CLI::PositiveNumber);
   command.add_option("--backend", o.backend, "Where to render and optimise: cpu, cuda or auto");
+  command.add_option(
+      "--loops", o.loops, "Places seen again correct the map: on, off or offline (at the end)");
   command.add_flag("--deterministic",
                    o.deterministic,
                    "Track and map in turns: the same output every time, for any thread count");
@@ -46,6 +48,7 @@ Result<RunRequest> RequestOf(const RunOptions& o) {
   const auto set = [&](const std::string& assignment) { config.overrides.push_back(assignment); };
   if (o.threads > 0) set("system.threads=" + std::to_string(o.threads));
   if (!o.backend.empty()) set("system.backend=" + o.backend);
+  if (!o.loops.empty()) set("loops.mode=" + o.loops);
   if (!o.format.empty()) set("input.format=" + o.format);
   if (o.deterministic) set("system.schedule=lockstep");
   Result<AppConfig> resolved = ResolveConfig<AppConfig>(config);

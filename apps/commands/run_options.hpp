@@ -17,6 +17,7 @@ struct RunOptions {
   int threads = 0;
   std::string backend;
   std::string format;
+  std::string loops;
   bool deterministic = false;
   bool realtime = false;
   bool quiet = false;

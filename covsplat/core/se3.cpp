@@ -104,6 +104,35 @@ Eigen::Matrix4d SE3::Matrix() const {
   return matrix;
 }
 
+Matrix6d AdjointOf(const Vector6d& xi) {
+  Matrix6d ad = Matrix6d::Zero();
+  ad.topLeftCorner<3, 3>() = Skew(xi.head<3>());
+  ad.bottomLeftCorner<3, 3>() = Skew(xi.tail<3>());
+  ad.bottomRightCorner<3, 3>() = ad.topLeftCorner<3, 3>();
+  return ad;
+}
+
+// The series of x / (1 - exp(-x)) = 1 + x/2 + x^2/12 - x^4/720 + ... at x = ad(xi), whose
+// eigenvalues are 0 and twice i theta and -i theta: a polynomial of fourth degree that has the
+// series' value and slope there is the whole series.
+Matrix6d InverseRightJacobian(const Vector6d& xi) {
+  constexpr double kSeriesBelow = 0.2;
+  const double theta = xi.head<3>().norm();
+  const double square = theta * theta;
+  double quadratic = 1.0 / 12.0 - square * square / 30240.0 - square * square * square / 604800.0;
+  double quartic = -1.0 / 720.0 - square / 15120.0 - square * square / 403200.0;
+  if (theta >= kSeriesBelow) {
+    const double half = 0.5 * theta;
+    const double value = half * std::cos(half) / std::sin(half);
+    const double slope_theta = value - square / (4.0 * std::sin(half) * std::sin(half));
+    quartic = (slope_theta + 2.0 * (1.0 - value)) / (2.0 * square * square);
+    quadratic = (1.0 - value) / square + quartic * square;
+  }
+  const Matrix6d ad = AdjointOf(xi);
+  const Matrix6d ad_square = ad * ad;
+  return Matrix6d::Identity() + 0.5 * ad + quadratic * ad_square + quartic * ad_square * ad_square;
+}
+
 SE3 Interpolate(const SE3& a, const SE3& b, double s) {
   return a * SE3::Exp(s * (a.Inverse() * b).Log());
 }

@@ -48,6 +48,13 @@ class SE3 {
   Eigen::Vector3d translation_ = Eigen::Vector3d::Zero();
 };
 
+/// Lie bracket matrix: ad(x) y = [x, y].
+Matrix6d AdjointOf(const Vector6d& xi);
+
+/// Inverse of the right Jacobian: (Exp(xi) * Exp(d)).Log() = xi + InverseRightJacobian(xi) * d for
+/// small d.
+Matrix6d InverseRightJacobian(const Vector6d& xi);
+
 /// Geodesic from a (s = 0) to b (s = 1); s outside [0, 1] extrapolates.
 SE3 Interpolate(const SE3& a, const SE3& b, double s);
 

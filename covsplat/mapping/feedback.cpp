@@ -94,11 +94,13 @@ void WeighByScales(std::vector<TargetSurfel>& surfels) {
 }  // namespace
 
 std::shared_ptr<const RegistrationTarget> BuildTarget(const GaussianMap& map,
-                                                      const SE3& T_map_sensor,
+                                                      const std::optional<SE3>& T_map_odom,
+                                                      const SE3& T_odom_sensor,
                                                       double reach_m,
                                                       const FeedbackConfig& config) {
-  const Eigen::Vector3d origin_map = T_map_sensor.Translation().array().round();
-  const SE3 T_origin_map(Eigen::Quaterniond::Identity(), -origin_map);
+  const Eigen::Vector3d origin_odom = T_odom_sensor.Translation().array().round();
+  SE3 T_origin_map(Eigen::Quaterniond::Identity(), -origin_odom);
+  if (T_map_odom) T_origin_map = T_origin_map * T_map_odom->Inverse();
   std::vector<TargetSurfel> surfels;
   for (const AnchorRange& range : map.Engine().Ranges()) {
     const SE3 T_origin_anchor = T_origin_map * map.KeyframePose(range.anchor);
@@ -108,7 +110,7 @@ std::shared_ptr<const RegistrationTarget> BuildTarget(const GaussianMap& map,
   const bool by_scales =
       config.weight == MatchWeight::kScales && config.mode != FeedbackMode::kNoWeight;
   if (by_scales) WeighByScales(surfels);
-  return std::make_shared<RegistrationTarget>(surfels, origin_map, map.Keyframes());
+  return std::make_shared<RegistrationTarget>(surfels, origin_odom, map.Keyframes());
 }
 
 std::vector<float> ScaleWeights(std::span<const Eigen::Vector2f> scales) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "covsplat/mapping/gaussian_map.hpp"
 #include "covsplat/registration/target.hpp"
@@ -73,10 +74,12 @@ struct FeedbackConfig {
 };
 
 /// Gaussians with m_i = 1, k_i >= k_min and alpha_i >= alpha_min (paper eq. 1) within reach of a
-/// pose that have not been seen through, with the weights that matches with them have. Positions
-/// are relative to the pose, rounded to metres.
+/// pose that have not been seen through, with the weights that matches with them have. They are in
+/// the frame of odometry, which is the map's own if `T_map_odom` is nothing, with positions
+/// relative to the pose, rounded to metres.
 std::shared_ptr<const RegistrationTarget> BuildTarget(const GaussianMap& map,
-                                                      const SE3& T_map_sensor,
+                                                      const std::optional<SE3>& T_map_odom,
+                                                      const SE3& T_odom_sensor,
                                                       double reach_m,
                                                       const FeedbackConfig& config);
 

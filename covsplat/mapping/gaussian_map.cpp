@@ -5,7 +5,7 @@
 
 namespace covsplat {
 int GaussianMap::AddKeyframe(const Keyframe& keyframe, const SpawnedGaussians& spawned) {
-  const int number = engine_->AddAnchor(keyframe.tracked.T_map_sensor);
+  const int number = engine_->AddAnchor(keyframe.PoseInMap());
   engine_->SetView(number, keyframe.measurement);
   SpawnedGaussians seen = spawned;
   for (GaussianSignals& signals : seen.signals) {
@@ -32,7 +32,7 @@ void GaussianMap::MarkSeen(int keyframe_number,
                            const Keyframe& keyframe,
                            const SensorModel& sensor) {
   const GaussianColumns<float>& table = engine_->Gaussians();
-  const SE3 T_sensor_map = keyframe.tracked.T_map_sensor.Inverse();
+  const SE3 T_sensor_map = keyframe.PoseInMap().Inverse();
   for (const AnchorRange& range : engine_->Ranges()) {
     const SE3 T_sensor_anchor = T_sensor_map * KeyframePose(range.anchor);
     if (T_sensor_anchor.Translation().norm() > 2.0 * sensor.MaxRange()) continue;

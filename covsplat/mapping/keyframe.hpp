@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,23 +16,26 @@ namespace covsplat {
 
 /// Of a scan that is no keyframe, what the next keyframe takes along.
 struct SweptScan {
-  SE3 T_map_sensor;
+  SE3 T_odom_sensor;
   std::vector<Eigen::Vector3f> points;  ///< all points, deskewed, sensor frame at mid scan, m
   std::vector<float> intensity = {};    ///< of each, or empty
 };
 
 /// A scan with its pose: everything that crosses from tracking to mapping. All vectors are in the
-/// sensor frame at mid scan.
+/// sensor frame at mid scan. Its pose is in the frame of odometry, in which the way that was
+/// tracked has no jumps; loops move that frame in the map.
 struct TrackedScan {
   std::int64_t scan = 0;  ///< ordinal in the run
   double stamp_s = 0.0;   ///< mid scan
-  SE3 T_map_sensor;
+  SE3 T_odom_sensor;
   std::vector<Eigen::Vector3f> points;      ///< all usable points, deskewed, m
   std::vector<float> intensity;             ///< of each, or empty
   std::vector<Eigen::Vector3f> surface;     ///< [S] deskewed source points of the registration, m
   std::vector<PointCovariance> covariance;  ///< [S] the surface around each
   std::vector<float> squared_distance;      ///< [S] m^2 to the target, infinity where unmatched
   std::vector<SweptScan> sweep;             ///< of a keyframe: the scans since the one before
+  std::vector<Eigen::Vector3d> weak_rotations;     ///< unit axes that the surfaces do not hold
+  std::vector<Eigen::Vector3d> weak_translations;  ///< ... and directions
 };
 
 /// A tracked scan on the sensor's image grid, with the surface each pixel lies on.
@@ -41,6 +45,13 @@ struct Keyframe {
   Image<int> point;                  ///< index into tracked.points, -1 where there is no return
   Image<int> surface;                ///< index into tracked.surface, -1 where it is unknown
   std::vector<float> control_score;  ///< [S] c, NaN where unknown
+  /// Nothing until a loop was closed: till then both frames are the same.
+  std::optional<SE3> T_map_odom = std::nullopt;
+
+  SE3 ToMap(const SE3& T_odom_any) const {
+    return T_map_odom ? *T_map_odom * T_odom_any : T_odom_any;
+  }
+  SE3 PoseInMap() const { return ToMap(tracked.T_odom_sensor); }
 };
 
 struct KeyframeConfig {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "covsplat/core/check.hpp"
+
 namespace covsplat {
 namespace {
 
@@ -36,15 +38,29 @@ Mapper::Mapper(std::unique_ptr<SplatEngine> engine,
       free_space_(sensor, config.reliability) {}
 
 void Mapper::Insert(Keyframe keyframe) {
+  keyframe.T_map_odom = T_map_odom_;
+  T_odom_newest_ = keyframe.tracked.T_odom_sensor;
   MaskMoved(keyframe);
   Spawn(keyframe);
   if (map_.Keyframes() % config_.manage.interval == 0) Manage();
 }
 
+void Mapper::Correct(std::span<const SE3> T_map_keyframe) {
+  const auto corrected = static_cast<int>(T_map_keyframe.size());
+  COVSPLAT_CHECK(corrected > 0 && corrected <= map_.Keyframes());
+  const SE3 moved = T_map_keyframe.back() * map_.KeyframePose(corrected - 1).Inverse();
+  for (int k = 0; k < map_.Keyframes(); ++k) {
+    const SE3 pose =
+        k < corrected ? T_map_keyframe[static_cast<std::size_t>(k)] : moved * map_.KeyframePose(k);
+    map_.Engine().SetAnchorPose(k, pose);
+  }
+  T_map_odom_ = map_.KeyframePose(map_.Keyframes() - 1) * T_odom_newest_.Inverse();
+}
+
 void Mapper::MaskMoved(Keyframe& keyframe) {
   const ScopedTimer timer(times_, "reliability");
   const std::vector<std::uint8_t> moved =
-      free_space_.FindMoved(keyframe.tracked.surface, keyframe.tracked.T_map_sensor, pool_);
+      free_space_.FindMoved(keyframe.tracked.surface, keyframe.tracked.T_odom_sensor, pool_);
   free_space_.Remember(keyframe);
   MaskSurfaces(moved, keyframe);
 }
@@ -55,7 +71,7 @@ PatchFit Mapper::FindPatches(const Keyframe& keyframe, const NearGaussians& near
   std::vector<Eigen::Vector3f> middles;
   for (const Patch& patch : fit.patches) middles.push_back(patch.mean);
   const std::vector<std::uint8_t> moved =
-      free_space_.FindMoved(middles, keyframe.tracked.T_map_sensor, pool_);
+      free_space_.FindMoved(middles, keyframe.tracked.T_odom_sensor, pool_);
   std::size_t i = 0;
   std::erase_if(fit.patches, [&](const Patch&) { return moved[i++] != 0; });
   return fit;
@@ -63,7 +79,7 @@ PatchFit Mapper::FindPatches(const Keyframe& keyframe, const NearGaussians& near
 
 void Mapper::Spawn(const Keyframe& keyframe) {
   const ScopedTimer timer(times_, "insert");
-  const SE3& T_map_sensor = keyframe.tracked.T_map_sensor;
+  const SE3 T_map_sensor = keyframe.PoseInMap();
   const NearGaussians near = map_.Near(T_map_sensor, sensor_.MaxRange());
   const PatchFit fit = FindPatches(keyframe, near);
   std::vector<std::size_t> replaced;
@@ -184,9 +200,9 @@ int Mapper::RandomNearView() {
   return by_distance[rng_.Below(near)].second;
 }
 
-std::shared_ptr<const RegistrationTarget> Mapper::MakeTarget(const SE3& T_map_sensor) {
+std::shared_ptr<const RegistrationTarget> Mapper::MakeTarget(const SE3& T_odom_sensor) {
   const ScopedTimer timer(times_, "target");
-  return BuildTarget(map_, T_map_sensor, 1.2 * sensor_.MaxRange(), config_.feedback);
+  return BuildTarget(map_, T_map_odom_, T_odom_sensor, 1.2 * sensor_.MaxRange(), config_.feedback);
 }
 
 }  // namespace covsplat

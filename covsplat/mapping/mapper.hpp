@@ -86,8 +86,15 @@ class Mapper {
   /// When the recording has ended: a last round of management, and `schedule.final_steps`.
   void Conclude();
 
-  /// The registration target around a pose.
-  std::shared_ptr<const RegistrationTarget> MakeTarget(const SE3& T_map_sensor);
+  /// The registration target around a pose, in the frame of odometry.
+  std::shared_ptr<const RegistrationTarget> MakeTarget(const SE3& T_odom_sensor);
+
+  /// Moves the first keyframes with all their Gaussians to where loops have them, and those that
+  /// are newer along with the last of them. The frame of odometry moves in the map as the newest
+  /// keyframe does, so that where scans are tracked nothing jumps.
+  void Correct(std::span<const SE3> T_map_keyframe);
+  /// Nothing until then: both frames are the same.
+  const std::optional<SE3>& T_map_odom() const { return T_map_odom_; }
 
   const GaussianMap& Map() const { return map_; }
   /// What the map, or the map as it was spawned, looks like from a pose.
@@ -125,6 +132,8 @@ class Mapper {
   Rng rng_{20250711};
   std::int64_t steps_ = 0;
   StageTimes times_;
+  std::optional<SE3> T_map_odom_;
+  SE3 T_odom_newest_;  ///< of the newest keyframe
 };
 
 }  // namespace covsplat

@@ -4,17 +4,17 @@ namespace covsplat {
 
 void FreeSpace::Remember(const Keyframe& keyframe) {
   if (!config_.enabled) return;
-  sights_.push_back({keyframe.tracked.T_map_sensor.Inverse(), keyframe.measurement.range_m});
+  sights_.push_back({keyframe.tracked.T_odom_sensor.Inverse(), keyframe.measurement.range_m});
   if (sights_.size() > static_cast<std::size_t>(config_.keyframes)) sights_.pop_front();
 }
 
 std::vector<std::uint8_t> FreeSpace::FindMoved(std::span<const Eigen::Vector3f> points,
-                                               const SE3& T_map_points,
+                                               const SE3& T_odom_points,
                                                ThreadPool& pool) const {
   std::vector<int> seen(points.size(), 0);
   std::vector<int> seen_through(points.size(), 0);
   for (const Sight& sight : sights_) {
-    const SE3 T_sensor_points = sight.T_sensor_map * T_map_points;
+    const SE3 T_sensor_points = sight.T_sensor_odom * T_odom_points;
     const Eigen::Matrix3f rotation = T_sensor_points.RotationMatrix().cast<float>();
     const Eigen::Vector3f translation = T_sensor_points.Translation().cast<float>();
     ParallelFor(pool, points.size(), 4096, [&](std::size_t begin, std::size_t end) {

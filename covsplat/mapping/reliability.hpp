@@ -31,7 +31,8 @@ struct ReliabilityConfig {
   }
 };
 
-/// What the newest keyframes have seen through. Ours: the paper claims a reliability mask without
+/// What the newest keyframes have seen through, in the frame of odometry, in which they lie to each
+/// other as they were tracked. Ours: the paper claims a reliability mask without
 /// saying how it is made.
 class FreeSpace {
  public:
@@ -43,12 +44,12 @@ class FreeSpace {
 
   /// [points] whether each is where the remembered keyframes say there is nothing.
   std::vector<std::uint8_t> FindMoved(std::span<const Eigen::Vector3f> points,
-                                      const SE3& T_map_points,
+                                      const SE3& T_odom_points,
                                       ThreadPool& pool) const;
 
  private:
   struct Sight {
-    SE3 T_sensor_map;
+    SE3 T_sensor_odom;
     Image<float> range_m;
   };
 

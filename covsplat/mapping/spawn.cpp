@@ -230,13 +230,14 @@ void SpawnFromPixels(const Keyframe& keyframe,
 }
 
 /// The keyframe's own points come last.
-std::vector<PosedPoints> WithSweep(const TrackedScan& tracked) {
+std::vector<PosedPoints> WithSweep(const Keyframe& keyframe) {
+  const TrackedScan& tracked = keyframe.tracked;
   std::vector<PosedPoints> scans;
   scans.reserve(tracked.sweep.size() + 1);
   for (const SweptScan& scan : tracked.sweep) {
-    scans.push_back({scan.T_map_sensor, scan.points, scan.intensity});
+    scans.push_back({keyframe.ToMap(scan.T_odom_sensor), scan.points, scan.intensity});
   }
-  scans.push_back({tracked.T_map_sensor, tracked.points, tracked.intensity});
+  scans.push_back({keyframe.PoseInMap(), tracked.points, tracked.intensity});
   return scans;
 }
 
@@ -260,7 +261,7 @@ PatchFit FitPatches(const Keyframe& keyframe,
                     const SpawnConfig& config,
                     ThreadPool& pool) {
   if (!config.patches.enabled) return {};
-  return FitPatches(WithSweep(keyframe.tracked), existing_sensor, sensor, config.patches, pool);
+  return FitPatches(WithSweep(keyframe), existing_sensor, sensor, config.patches, pool);
 }
 
 SpawnedGaussians SpawnGaussians(const Keyframe& keyframe,

@@ -61,13 +61,6 @@ Eigen::Matrix<float, 10, 1> LeverTerms(const Eigen::Vector3f& lever) {
 
 }  // namespace
 
-Matrix6d AdjointOf(const Vector6d& twist) {
-  Matrix6d ad = Matrix6d::Zero();
-  ad.topLeftCorner<3, 3>() = ad.bottomRightCorner<3, 3>() = Skew(twist.head<3>());
-  ad.bottomLeftCorner<3, 3>() = Skew(twist.tail<3>());
-  return ad;
-}
-
 PhaseMoments& PhaseMoments::operator+=(const PhaseMoments& other) {
   for (std::size_t k = 0; k < kMoments; ++k) moment[k] += other.moment[k];
   lever += other.lever;

@@ -16,9 +16,6 @@ namespace covsplat {
 
 using Vector18d = Eigen::Matrix<double, 18, 1>;
 
-/// Lie bracket matrix: ad(x) y = [x, y].
-Matrix6d AdjointOf(const Vector6d& twist);
-
 /// Sums over matches. With the residual e, its Jacobian J by a twist of the mid pose, the weight w
 /// and M = (C_t + R C_s R^T)^-1: the k-th moment holds the sums of s^k w J^T M J and s^k w J^T M e.
 /// Because a twist at mid scan moves a point of phase s by J, the velocity by s J and the

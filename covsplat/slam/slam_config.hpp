@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "covsplat/loops/loop_closer.hpp"
 #include "covsplat/mapping/mapper.hpp"
 #include "covsplat/slam/tracker.hpp"
 
@@ -52,6 +53,30 @@ struct EnumNames<Schedule> {
       {{Schedule::kThreaded, "threaded"}, {Schedule::kLockstep, "lockstep"}}};
 };
 
+/// Whether places that are seen again correct the map.
+enum class LoopMode {
+  kOff,
+  kOn,       ///< as soon as a loop is known
+  kOffline,  ///< after the last scan
+};
+
+template <>
+struct EnumNames<LoopMode> {
+  static constexpr std::array<EnumName<LoopMode>, 3> kNames{
+      {{LoopMode::kOff, "off"}, {LoopMode::kOn, "on"}, {LoopMode::kOffline, "offline"}}};
+};
+
+struct LoopsConfig {
+  LoopMode mode = LoopMode::kOff;
+  LoopConfig closer;
+
+  template <class Self, class V>
+  static void Visit(Self& c, V&& v) {
+    v.Field("mode", c.mode, "when places that are seen again correct the map");
+    LoopConfig::Visit(c.closer, v);
+  }
+};
+
 struct SystemConfig {
   Schedule schedule = Schedule::kThreaded;
   Backend backend = Backend::kAuto;
@@ -79,6 +104,7 @@ struct SlamConfig {
   SensorConfig sensor;
   TrackerConfig tracker;
   MapperConfig mapper;
+  LoopsConfig loops;
   SystemConfig system;
 
   template <class Self, class V>
@@ -90,6 +116,7 @@ struct SlamConfig {
     v.Section("recovery", c.tracker.recovery, "when a scan counts as lost");
     v.Section("keyframe", c.tracker.keyframe, "which scans become keyframes");
     v.Section("mapping", c.mapper, "the Gaussian map");
+    v.Section("loops", c.loops, "places that are seen again");
     v.Section("system", c.system, "threads and schedule");
   }
 };

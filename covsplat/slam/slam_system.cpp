@@ -22,7 +22,6 @@ ScanRecord MakeRecord(const TrackResult& result) {
   ScanRecord record;
   record.scan = result.tracked.scan;
   record.stamp_s = result.tracked.stamp_s;
-  record.T_map_sensor = result.tracked.T_map_sensor;
   record.state = result.state;
   record.is_keyframe = result.is_keyframe;
   record.points = result.points;
@@ -39,6 +38,13 @@ ScanRecord MakeRecord(const TrackResult& result) {
   record.degenerate_directions = result.align.degenerate_directions;
   record.times = result.times;
   return record;
+}
+
+LoopKeyframe LoopKeyframeOf(int keyframe, const TrackedScan& tracked, double voxel_m) {
+  return {tracked.T_odom_sensor,
+          tracked.weak_rotations,
+          tracked.weak_translations,
+          MakePlace(keyframe, tracked.points, tracked.surface, tracked.covariance, voxel_m)};
 }
 
 }  // namespace
@@ -74,12 +80,21 @@ SlamSystem::SlamSystem(const SlamConfig& config,
       next_held_out_(held_out_stride_),
       mapper_(std::move(engine), sensor, config.mapper, *map_pool_),
       keyframes_(kKeyframeQueue) {
-  if (config_.system.schedule == Schedule::kThreaded) {
+  const bool threaded = config_.system.schedule == Schedule::kThreaded;
+  if (config_.loops.mode != LoopMode::kOff) {
+    loops_ = std::make_unique<LoopWorker>(config_.loops.closer, threaded);
+  }
+  if (threaded) {
     mapper_thread_ = std::jthread([this] { MapperLoop(); });
   }
 }
 
 SlamSystem::~SlamSystem() { keyframes_.Close(); }
+
+void SlamSystem::UsePoses(Trajectory poses) {
+  given_poses_ = std::move(poses);
+  loops_.reset();
+}
 
 std::optional<ScanRecord> SlamSystem::Process(const Scan& scan) {
   COVSPLAT_CHECK(!finished_);
@@ -93,6 +108,10 @@ std::optional<ScanRecord> SlamSystem::Process(const Scan& scan) {
       std::chrono::steady_clock::now() - start;
 
   ScanRecord record = MakeRecord(*result);
+  const SE3& T_odom_sensor = result->tracked.T_odom_sensor;
+  const std::shared_ptr<const SE3> T_map_odom = T_map_odom_.Get();
+  record.T_map_sensor = T_map_odom ? *T_map_odom * T_odom_sensor : T_odom_sensor;
+  path_.push_back({record.scan, T_odom_sensor});
   record.track_ms = elapsed.count();
   record.target_surfels = target ? target->Size() : 0;
   if (result->first) HandOver(std::move(*result->first), &record.times);
@@ -134,12 +153,18 @@ void SlamSystem::WaitForMap(double support, StageTimes& times) {
 // One keyframe's way through the mapper; the target is published as soon as it holds the keyframe,
 // and again once it has been optimised.
 void SlamSystem::MapKeyframe(TrackedScan tracked, StageTimes& times) {
+  if (loops_) {
+    const ScopedTimer timer(times, "loops");
+    loops_->Post(
+        LoopKeyframeOf(mapper_.Map().Keyframes(), tracked, config_.loops.closer.check.voxel_m));
+  }
   {
     const ScopedTimer timer(times, "keyframe");
-    T_map_newest_ = tracked.T_map_sensor;
+    T_odom_newest_ = tracked.T_odom_sensor;
     mapper_.Insert(MakeKeyframe(
         std::move(tracked), sensor_, config_.system.max_surface_distance_m, *map_pool_));
   }
+  if (config_.loops.mode == LoopMode::kOn) Correct();
   if (config_.system.schedule == Schedule::kThreaded) PublishTarget();
   if (keyframes_.Empty()) {  // as always in lockstep
     mapper_.OptimizeNewest();
@@ -150,10 +175,18 @@ void SlamSystem::MapKeyframe(TrackedScan tracked, StageTimes& times) {
   AddTimes(times, mapper_.TakeTimes());
 }
 
+void SlamSystem::Correct() {
+  if (!loops_) return;
+  const std::optional<std::vector<SE3>> T_map_keyframe = loops_->TakeCorrection();
+  if (!T_map_keyframe) return;
+  mapper_.Correct(*T_map_keyframe);
+  T_map_odom_.Publish(std::make_shared<const SE3>(*mapper_.T_map_odom()));
+}
+
 void SlamSystem::PublishTarget() {
   gaussians_ = mapper_.Map().Size();
   mapper_steps_ = mapper_.Steps();
-  target_.Publish(mapper_.MakeTarget(T_map_newest_));
+  target_.Publish(mapper_.MakeTarget(T_odom_newest_));
 }
 
 void SlamSystem::MapperLoop() {
@@ -168,6 +201,7 @@ void SlamSystem::MapperLoop() {
     }
     if (keyframes_.Closed()) return;
     mapper_.OptimizeIdle();
+    if (config_.loops.mode == LoopMode::kOn) Correct();
     if (++idle_visits % kVisitsPerTarget == 0) PublishTarget();
     AddTimes(mapper_times_, mapper_.TakeTimes());
   }
@@ -176,9 +210,7 @@ void SlamSystem::MapperLoop() {
 bool SlamSystem::MaybeHoldOut(const TrackResult& result) {
   if (held_out_stride_ == 0 || result.state != TrackState::kTracking) return false;
   if (scans_ < next_held_out_) return false;
-  held_out_.push_back({result.tracked.scan,
-                       result.tracked.T_map_sensor,
-                       ProjectScan(sensor_, result.tracked.points).range_m});
+  held_out_.push_back({result.tracked.scan, ProjectScan(sensor_, result.tracked.points).range_m});
   next_held_out_ = scans_ + held_out_stride_;
   if (held_out_.size() < kMaxHeldOut) return true;
   // Long runs: keep every other one and take half as many from now on.
@@ -192,7 +224,8 @@ bool SlamSystem::MaybeHoldOut(const TrackResult& result) {
 void SlamSystem::AddToSweep(TrackResult& result) {
   if (!config_.mapper.spawn.patches.enabled || result.state != TrackState::kTracking) return;
   TrackedScan& tracked = result.tracked;
-  sweep_.push_back({tracked.T_map_sensor, std::move(tracked.points), std::move(tracked.intensity)});
+  sweep_.push_back(
+      {tracked.T_odom_sensor, std::move(tracked.points), std::move(tracked.intensity)});
 }
 
 void SlamSystem::Finish() {
@@ -203,11 +236,34 @@ void SlamSystem::Finish() {
   }
   keyframes_.Close();
   if (mapper_thread_.joinable()) mapper_thread_.join();
+  if (loops_) loops_->Finish();
+  Correct();
   AddTimes(mapper_times_, last_times);
   mapper_.Conclude();
   AddTimes(mapper_times_, mapper_.TakeTimes());
   gaussians_ = mapper_.Map().Size();
   mapper_steps_ = mapper_.Steps();
+}
+
+SE3 SlamSystem::OdometryPoseOf(std::int64_t scan) const {
+  return std::ranges::lower_bound(path_, scan, {}, &OdometryPose::scan)->T_odom_sensor;
+}
+
+SE3 SlamSystem::PoseOf(std::int64_t scan) const {
+  const SE3 T_odom_scan = OdometryPoseOf(scan);
+  if (!mapper_.T_map_odom()) return T_odom_scan;
+  const auto as_seen_from = [&](auto keyframe) {
+    const SE3 T_keyframe_scan = OdometryPoseOf(*keyframe).Inverse() * T_odom_scan;
+    const auto number = static_cast<int>(keyframe - keyframe_scans_.begin());
+    return mapper_.Map().KeyframePose(number) * T_keyframe_scan;
+  };
+  const auto after = std::ranges::upper_bound(keyframe_scans_, scan);
+  if (after == keyframe_scans_.begin()) return as_seen_from(after);
+  const auto before = std::prev(after);
+  if (after == keyframe_scans_.end()) return as_seen_from(before);
+  const double share =
+      static_cast<double>(scan - *before) / static_cast<double>(*after - *before);
+  return Interpolate(as_seen_from(before), as_seen_from(after), share);
 }
 
 }  // namespace covsplat

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "covsplat/core/sync.hpp"
+#include "covsplat/slam/loop_worker.hpp"
 #include "covsplat/slam/slam_config.hpp"
 
 namespace covsplat {
@@ -14,7 +15,7 @@ namespace covsplat {
 struct ScanRecord {
   std::int64_t scan = 0;
   double stamp_s = 0.0;  ///< mid scan: the time of the pose
-  SE3 T_map_sensor;
+  SE3 T_map_sensor;      ///< as known then; SlamSystem::Path() has what loops made of it
   TrackState state = TrackState::kInitializing;
   bool is_keyframe = false;
   std::size_t points = 0;
@@ -39,7 +40,6 @@ struct ScanRecord {
 /// A scan kept out of the map to measure it by.
 struct HeldOut {
   std::int64_t scan = 0;
-  SE3 T_map_sensor;
   Image<float> range_m;
 };
 
@@ -53,7 +53,7 @@ class SlamSystem {
 
   /// Maps with these poses instead of tracking; scans without one are skipped. Before the first
   /// scan.
-  void UsePoses(Trajectory poses) { given_poses_ = std::move(poses); }
+  void UsePoses(Trajectory poses);
 
   /// Tracks a scan and hands it to the mapper if it is a keyframe. Nothing if it has no given pose.
   /// Not after Finish.
@@ -66,11 +66,22 @@ class SlamSystem {
   Mapper& GetMapper() { return mapper_; }
   const SensorModel& Sensor() const { return sensor_; }
   const std::vector<HeldOut>& HeldOuts() const { return held_out_; }
+  /// T_map_sensor of a processed scan; after Finish. Loops have moved it with the keyframes before
+  /// and after it.
+  SE3 PoseOf(std::int64_t scan) const;
+  /// What became of the places that were looked at as loops, and the pose graph; after Finish.
+  /// Null if loops are off.
+  const LoopCloser* Loops() const { return loops_ ? &loops_->Closer() : nullptr; }
   const std::vector<std::int64_t>& KeyframeScans() const { return keyframe_scans_; }
   /// Time the mapper spent per stage; after Finish.
   const StageTimes& MapperTimes() const { return mapper_times_; }
 
  private:
+  struct OdometryPose {
+    std::int64_t scan;
+    SE3 T_odom_sensor;
+  };
+
   SlamSystem(const SlamConfig& config,
              const SensorModel& sensor,
              std::unique_ptr<ThreadPool> track_pool,
@@ -81,7 +92,9 @@ class SlamSystem {
   void WaitForMap(double support, StageTimes& times);
   void MapKeyframe(TrackedScan keyframe, StageTimes& times);
   void MapperLoop();
+  void Correct();
   void PublishTarget();
+  SE3 OdometryPoseOf(std::int64_t scan) const;
   bool MaybeHoldOut(const TrackResult& result);
   void AddToSweep(TrackResult& result);
 
@@ -95,7 +108,8 @@ class SlamSystem {
   Tracker tracker_;
   std::optional<Trajectory> given_poses_;
   std::vector<HeldOut> held_out_;
-  std::vector<SweptScan> sweep_;  ///< scans since the last keyframe
+  std::vector<SweptScan> sweep_;    ///< scans since the last keyframe
+  std::vector<OdometryPose> path_;  ///< of every processed scan
   std::vector<std::int64_t> keyframe_scans_;
   std::int64_t scans_ = 0;
   int held_out_stride_;
@@ -105,11 +119,13 @@ class SlamSystem {
   // Owned by the mapper thread while it runs, by the calling thread otherwise.
   Mapper mapper_;
   StageTimes mapper_times_;
-  SE3 T_map_newest_;
+  SE3 T_odom_newest_;                  ///< of the newest keyframe
+  std::unique_ptr<LoopWorker> loops_;  ///< null if off
 
   // Where the two threads meet.
   BoundedQueue<TrackedScan> keyframes_;
   Latest<RegistrationTarget> target_;
+  Latest<SE3> T_map_odom_;  ///< null until a loop was closed
   std::atomic<std::size_t> gaussians_{0};
   std::atomic<std::int64_t> mapper_steps_{0};
 

@@ -237,7 +237,7 @@ TrackedScan Tracker::Deskewed(const Scan& scan,
   TrackedScan tracked;
   tracked.scan = scan.index;
   tracked.stamp_s = prepared.timing.mid_stamp_s;
-  tracked.T_map_sensor = motion.T_map_sensor;
+  tracked.T_odom_sensor = motion.T_map_sensor;
   tracked.points = Deskew(scan.points, prepared.timing.phase, motion);
   tracked.intensity = scan.intensity;
   tracked.surface = Deskew(prepared.source.points, prepared.source.phase, motion);
@@ -262,6 +262,8 @@ void Tracker::Conclude(const Scan& scan,
                        TrackResult& result) {
   const ScopedTimer timer(result.times, "deskew");
   result.tracked = Deskewed(scan, prepared, motion, result.align.squared_distance);
+  result.tracked.weak_rotations = result.align.weak_rotations;
+  result.tracked.weak_translations = result.align.weak_translations;
   result.overlap = Overlap(result.align.squared_distance, config_.keyframe.overlap_distance_m);
   const double gap_s = prepared.timing.mid_stamp_s - last_stamp_s_;
   if (has_motion_ && gap_s > 0.0 && result.state == TrackState::kTracking) {
@@ -298,17 +300,17 @@ void Tracker::Conclude(const Scan& scan,
 
 // Overlap with a target that lacks a keyframe would ask for that keyframe again.
 bool Tracker::WantsKeyframe(const TrackResult& result) const {
-  if (!T_map_keyframe_) return true;
+  if (!T_odom_keyframe_) return true;
   const KeyframeConfig& policy = config_.keyframe;
-  const Vector6d moved = (T_map_keyframe_->Inverse() * result.tracked.T_map_sensor).Log();
+  const Vector6d moved = (T_odom_keyframe_->Inverse() * result.tracked.T_odom_sensor).Log();
   const bool leaves_map = result.keyframes_waiting == 0 && result.overlap < policy.min_overlap;
   return moved.tail<3>().norm() > policy.max_distance_m ||
          moved.head<3>().norm() > policy.max_angle_deg * kDegree || leaves_map ||
          scans_since_keyframe_ >= policy.max_scans;
 }
 
-void Tracker::CountKeyframe(const SE3& T_map_sensor) {
-  T_map_keyframe_ = T_map_sensor;
+void Tracker::CountKeyframe(const SE3& T_odom_sensor) {
+  T_odom_keyframe_ = T_odom_sensor;
   scans_since_keyframe_ = 0;
   ++keyframes_;
 }

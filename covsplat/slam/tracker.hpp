@@ -83,6 +83,7 @@ struct TrackResult {
   StageTimes times;
 };
 
+/// What it takes for the map's frame is that of odometry: where targets are.
 class Tracker {
  public:
   Tracker(const TrackerConfig& config, ThreadPool& pool);
@@ -132,7 +133,7 @@ class Tracker {
                 const ScanMotion& motion,
                 TrackResult& result);
   bool WantsKeyframe(const TrackResult& result) const;
-  void CountKeyframe(const SE3& T_map_sensor);
+  void CountKeyframe(const SE3& T_odom_sensor);
   int KeyframesNotIn(const RegistrationTarget* target) const;
 
   const TrackerConfig config_;
@@ -147,7 +148,7 @@ class Tracker {
   double last_duration_s_ = 0.0;
   Vector6d velocity_ = Vector6d::Zero();  ///< per second, from the last two tracked scans
 
-  std::optional<SE3> T_map_keyframe_;  ///< of the last keyframe
+  std::optional<SE3> T_odom_keyframe_;  ///< of the last keyframe
   int scans_since_keyframe_ = 0;
   int keyframes_ = 0;
   double usual_inlier_ratio_ = 0.0;  ///< mean over the last tracked scans

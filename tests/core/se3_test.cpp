@@ -57,6 +57,31 @@ TEST(SE3, InterpolateHitsBothEndsAndTheMiddle) {
   EXPECT_LT((first - second).norm(), 1e-10);
 }
 
+TEST(SE3, InverseRightJacobianIsTheSlopeOfLog) {
+  Rng rng(6);
+  constexpr double kStep = 1e-6;
+  // Both sides of where the series ends, and near half a turn.
+  for (const double angle : {1e-9, 1e-3, 0.19999, 0.20001, 1.0, 3.0}) {
+    Vector6d xi = RandomTwist(rng, 1.0, 10.0);
+    xi.head<3>() *= angle / xi.head<3>().norm();
+    Matrix6d slopes;
+    for (int k = 0; k < 6; ++k) {
+      const Vector6d d = kStep * Vector6d::Unit(k);
+      slopes.col(k) =
+          ((SE3::Exp(xi) * SE3::Exp(d)).Log() - (SE3::Exp(xi) * SE3::Exp(-d)).Log()) / (2 * kStep);
+    }
+    EXPECT_LT((InverseRightJacobian(xi) - slopes).norm(), 1e-7 * slopes.norm()) << angle;
+  }
+}
+
+TEST(SE3, InverseRightJacobianIsSmoothWhereItsSeriesEnds) {
+  Vector6d below = (Vector6d() << 0.12, -0.16, 0.0, 3.0, -5.0, 2.0).finished();  // 0.2 rad
+  Vector6d above = below;
+  below.head<3>() *= 1.0 - 1e-9;
+  above.head<3>() *= 1.0 + 1e-9;
+  EXPECT_LT((InverseRightJacobian(above) - InverseRightJacobian(below)).norm(), 1e-8);
+}
+
 TEST(SE3, FromMatrixFindsTheNearestRigidTransform) {
   Rng rng(5);
   const SE3 truth = SE3::Exp(RandomTwist(rng, 1.0, 3.0));

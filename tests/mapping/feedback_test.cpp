@@ -43,7 +43,7 @@ class BuildTargetTest : public ::testing::Test {
   }
   std::shared_ptr<const RegistrationTarget> Build(const FeedbackConfig& config = {},
                                                   const SE3& T_map_sensor = SE3()) {
-    return BuildTarget(map_, T_map_sensor, kReach, config);
+    return BuildTarget(map_, std::nullopt, T_map_sensor, kReach, config);
   }
   /// The record of the Gaussian that was the `index`-th to be added.
   static const RegistrationTarget::Record& RecordOf(const RegistrationTarget& target, int index) {
@@ -143,7 +143,7 @@ TEST_F(BuildTargetTest, IsAsPreciseFarFromTheOriginAsNearIt) {
   const auto at_home = Build({}, near);
   GaussianMap remote(std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()));
   remote.AddKeyframe(SphereKeyframe(far, 0.0f), Spawned(surfels));
-  const auto abroad = BuildTarget(remote, far, kReach, {});
+  const auto abroad = BuildTarget(remote, std::nullopt, far, kReach, {});
   ASSERT_EQ(at_home->Size(), surfels.size());
   ASSERT_EQ(abroad->Size(), surfels.size());
   EXPECT_EQ(abroad->OriginMap() - at_home->OriginMap(), far_away);

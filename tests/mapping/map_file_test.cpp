@@ -57,7 +57,7 @@ class MapFileTest : public testing::Test {
     fs::create_directories(folder_);
     const auto add = [&](const SE3& T_map_sensor, const SpawnedGaussians& spawned) {
       Keyframe keyframe;
-      keyframe.tracked.T_map_sensor = T_map_sensor;
+      keyframe.tracked.T_odom_sensor = T_map_sensor;
       keyframe.measurement.range_m = Image<float>(sensor_.Rows(), sensor_.Columns());
       keyframe.measurement.normal = Image<Eigen::Vector3f>(
           sensor_.Rows(), sensor_.Columns(), Eigen::Vector3f(Eigen::Vector3f::Zero()));

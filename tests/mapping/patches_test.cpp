@@ -36,7 +36,7 @@ SweptScan Wall(int count, std::uint64_t seed) {
 std::vector<PosedPoints> Views(const std::vector<SweptScan>& scans) {
   std::vector<PosedPoints> views;
   for (const SweptScan& scan : scans) {
-    views.push_back({scan.T_map_sensor, scan.points, scan.intensity});
+    views.push_back({scan.T_odom_sensor, scan.points, scan.intensity});
   }
   return views;
 }
@@ -183,26 +183,26 @@ TEST_F(PatchesTest, GatherScansFromAllPoses) {
   for (int i = 1; i <= 20; ++i) {
     SweptScan scan = Wall(1000, static_cast<std::uint64_t>(i));
     const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.1 * i, Eigen::Vector3d::UnitZ()));
-    scan.T_map_sensor = SE3(turn, {0.01 * i, 0.0, 0.0});
+    scan.T_odom_sensor = SE3(turn, {0.01 * i, 0.0, 0.0});
     for (Eigen::Vector3f& p : scan.points) {
-      p = (scan.T_map_sensor.Inverse() * p.cast<double>()).cast<float>();
+      p = (scan.T_odom_sensor.Inverse() * p.cast<double>()).cast<float>();
     }
     scans.push_back(std::move(scan));
   }
-  const SE3 T_sensor_map = scans.back().T_map_sensor.Inverse();
+  const SE3 T_sensor_map = scans.back().T_odom_sensor.Inverse();
   const Eigen::Vector3d normal = T_sensor_map.Rotation() * -Eigen::Vector3d::UnitX();
   const PatchFit fit = Fit(scans);
   EXPECT_GE(fit.patches.size(), 25u);
   for (const Patch& patch : fit.patches) {  // in the frame of the last scan
     EXPECT_GT(patch.axes.col(2).dot(normal.cast<float>()), 0.999f);
-    EXPECT_NEAR((scans.back().T_map_sensor * patch.mean.cast<double>()).x(), 5.2, 5e-3);
+    EXPECT_NEAR((scans.back().T_odom_sensor * patch.mean.cast<double>()).x(), 5.2, 5e-3);
   }
 }
 
 TEST_F(PatchesTest, AreTheSameFarFromTheOriginAndForAnyNumberOfThreads) {
   const SE3 far(Eigen::Quaterniond::Identity(), {8000.0, -4000.0, 80.0});  // whole cells away
   SweptScan moved = Wall(20000, 1);
-  moved.T_map_sensor = far;
+  moved.T_odom_sensor = far;
   const PatchFit near_fit = Fit({Wall(20000, 1)});
   const PatchFit far_fit = Fit({moved});
   ThreadPool one(1);

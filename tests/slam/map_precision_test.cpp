@@ -60,7 +60,7 @@ Means HeldOutMeans(const SavedMap& saved, const SlamSystem& system, ThreadPool& 
   Means means;
   for (const HeldOut& scan : system.HeldOuts()) {
     const HeldOutErrors errors =
-        MeasureHeldOut(scan.range_m, engine->Render(scan.T_map_sensor).range_m);
+        MeasureHeldOut(scan.range_m, engine->Render(system.PoseOf(scan.scan)).range_m);
     means.error_m += errors.mean_abs_m / static_cast<double>(system.HeldOuts().size());
     means.median_error_m += errors.median_abs_m / static_cast<double>(system.HeldOuts().size());
     means.coverage += errors.coverage / static_cast<double>(system.HeldOuts().size());

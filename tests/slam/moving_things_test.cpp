@@ -39,10 +39,10 @@ Counts JudgeStreet(int seed) {
   for (int i = 0; i < kScans; i += kScansPerKeyframe) {
     const Scan scan = Deskewed(simulation.MakeScan(i, pool), simulation.SensorMotion());
     Keyframe keyframe;
-    keyframe.tracked.T_map_sensor = simulation.PoseOf(i);
+    keyframe.tracked.T_odom_sensor = simulation.PoseOf(i);
     keyframe.measurement.range_m = ProjectScan(sensor, scan.points).range_m;
     const std::vector<std::uint8_t> moved =
-        space.FindMoved(scan.points, keyframe.tracked.T_map_sensor, pool);
+        space.FindMoved(scan.points, keyframe.tracked.T_odom_sensor, pool);
     space.Remember(keyframe);
     for (std::size_t k = 0; k < moved.size(); ++k) {
       const bool moves = scan.label[k] != 0;

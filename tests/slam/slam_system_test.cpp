@@ -87,7 +87,7 @@ double Ate(const SlamRun& run) {
 double HeldOutError(const SlamRun& run) {
   double sum = 0.0;
   for (const HeldOut& held_out : run.system->HeldOuts()) {
-    const RenderOutput render = run.system->GetMapper().Render(held_out.T_map_sensor);
+    const RenderOutput render = run.system->GetMapper().Render(run.system->PoseOf(held_out.scan));
     sum += MeanRangeError(render.range_m, held_out.range_m);
   }
   return sum / static_cast<double>(run.system->HeldOuts().size());

@@ -72,8 +72,8 @@ class TrackerTest : public ::testing::Test {
 
   static void ExpectAt(const TrackResult& result, const SE3& truth) {
     EXPECT_EQ(result.state, TrackState::kTracking);
-    EXPECT_LT(TranslationError(result.tracked.T_map_sensor, truth), kSameM);
-    EXPECT_LT(RotationError(result.tracked.T_map_sensor, truth), kSameRad);
+    EXPECT_LT(TranslationError(result.tracked.T_odom_sensor, truth), kSameM);
+    EXPECT_LT(RotationError(result.tracked.T_odom_sensor, truth), kSameRad);
   }
 
   /// Median distance, along the rays, of the points behind the sensor from the surfaces that it
@@ -104,7 +104,7 @@ TEST_F(TrackerTest, StartsWithTheFirstScanWithoutAMap) {
   EXPECT_EQ(result.state, TrackState::kInitializing);
   EXPECT_FALSE(result.is_keyframe);
   EXPECT_FALSE(result.first);
-  EXPECT_EQ(TranslationError(result.tracked.T_map_sensor, SE3()), 0.0);
+  EXPECT_EQ(TranslationError(result.tracked.T_odom_sensor, SE3()), 0.0);
   EXPECT_TRUE(result.has_time);
 }
 
@@ -172,7 +172,7 @@ TEST_F(TrackerTest, PredictsThatTheSensorGoesOnAsBefore) {
   TrackFirst(tracker, Drive, 5);
   const TrackResult blind = tracker.Track(EmptyScan(5), &map_);
   EXPECT_EQ(blind.state, TrackState::kLost);
-  EXPECT_LT(TranslationError(blind.tracked.T_map_sensor, Drive(StampOf(5))), kPredictedM);
+  EXPECT_LT(TranslationError(blind.tracked.T_odom_sensor, Drive(StampOf(5))), kPredictedM);
 }
 
 TEST_F(TrackerTest, PredictsThatTheSensorGoesOnAsBeforeWithoutTimesOfPoints) {
@@ -183,7 +183,7 @@ TEST_F(TrackerTest, PredictsThatTheSensorGoesOnAsBeforeWithoutTimesOfPoints) {
     if (k > 0) ExpectAt(result, Drive(StampOf(k)));
   }
   const TrackResult blind = tracker.Track(EmptyScan(5), &map_);
-  EXPECT_LT(TranslationError(blind.tracked.T_map_sensor, Drive(StampOf(5))), kPredictedM);
+  EXPECT_LT(TranslationError(blind.tracked.T_odom_sensor, Drive(StampOf(5))), kPredictedM);
 }
 
 TEST_F(TrackerTest, FollowsASensorWithoutTimesThatMovesFartherPerScanThanItMatches) {
@@ -216,7 +216,7 @@ TEST_F(TrackerTest, FindsOutHowItTurnedWhenNothingFitsTheWayItWent) {
     Tracker tracker(searches ? TrackerConfig{} : blind, pool_);
     TrackFirst(tracker, jolted, 4);
     const TrackResult result = tracker.Track(InstantScanOf(jolted, 4), &map_);
-    const double off_rad = RotationError(result.tracked.T_map_sensor, jolted(StampOf(4)));
+    const double off_rad = RotationError(result.tracked.T_odom_sensor, jolted(StampOf(4)));
     EXPECT_EQ(off_rad < kSameRad, searches) << off_rad;
   }
 }
@@ -227,7 +227,7 @@ TEST_F(TrackerTest, IsLostInAnEmptyScanAndRecovers) {
   const TrackResult lost = tracker.Track(EmptyScan(4), &map_);
   EXPECT_EQ(lost.state, TrackState::kLost);
   EXPECT_FALSE(lost.is_keyframe);
-  EXPECT_TRUE(lost.tracked.T_map_sensor.IsFinite());
+  EXPECT_TRUE(lost.tracked.T_odom_sensor.IsFinite());
   ExpectAt(tracker.Track(ScanOf(Drive, 5), &map_), Drive(StampOf(5)));
 }
 
@@ -239,7 +239,7 @@ TEST_F(TrackerTest, IsLostInGarbageAndRecovers) {
     EXPECT_EQ(lost.state, TrackState::kLost);
     EXPECT_FALSE(lost.is_keyframe);
     // Velocity is halved with every lost scan: of 30 cm, 7.5 cm are missing after two.
-    EXPECT_LT(TranslationError(lost.tracked.T_map_sensor, Drive(StampOf(k))), 0.1);
+    EXPECT_LT(TranslationError(lost.tracked.T_odom_sensor, Drive(StampOf(k))), 0.1);
   }
   ExpectAt(tracker.Track(ScanOf(Drive, 6), &map_), Drive(StampOf(6)));
 }
@@ -251,7 +251,7 @@ TEST_F(TrackerTest, IsLostSomewhereElseAndRecovers) {
   const TrackResult lost = tracker.Track(ScanOf(elsewhere, 4, Corridor()), &map_);
   EXPECT_EQ(lost.state, TrackState::kLost);
   EXPECT_FALSE(lost.is_keyframe);
-  EXPECT_LT(TranslationError(lost.tracked.T_map_sensor, Drive(StampOf(4))), kPredictedM);
+  EXPECT_LT(TranslationError(lost.tracked.T_odom_sensor, Drive(StampOf(4))), kPredictedM);
   ExpectAt(tracker.Track(ScanOf(Drive, 5), &map_), Drive(StampOf(5)));
 }
 
@@ -401,7 +401,7 @@ TEST_F(FollowTest, TakesPosesAsGivenAndDeskewsByThem) {
     const std::optional<TrackResult> result = tracker.Follow(ScanOf(Driven, k), Given(), &map_);
     ASSERT_TRUE(result);
     EXPECT_EQ(result->state, TrackState::kTracking);
-    EXPECT_LT(TranslationError(result->tracked.T_map_sensor, Driven(StampOf(k))), 1e-6);
+    EXPECT_LT(TranslationError(result->tracked.T_odom_sensor, Driven(StampOf(k))), 1e-6);
     EXPECT_LT(MedianMisfit(result->tracked.points, Driven(StampOf(k))), 2.0 * kNoise);
     EXPECT_EQ(result->tracked.squared_distance.size(), result->tracked.surface.size());
     EXPECT_GT(result->overlap, 0.8);

@@ -35,7 +35,7 @@ inline TrackedScan TrackedStill(const RayScene& scene,
   scan.time_offset_s.clear();
   SourceCloud source = PreprocessStill(scan, pool);
   TrackedScan tracked;
-  tracked.T_map_sensor = T_map_sensor;
+  tracked.T_odom_sensor = T_map_sensor;
   tracked.points = std::move(scan.points);
   tracked.surface = std::move(source.points);
   tracked.covariance = std::move(source.covariance);
@@ -62,7 +62,7 @@ inline Keyframe StillKeyframe(const RayScene& scene,
 inline Keyframe SphereKeyframe(const SE3& T_map_sensor, float range_m) {
   const SensorModel sensor = ReducedSensor();
   Keyframe keyframe;
-  keyframe.tracked.T_map_sensor = T_map_sensor;
+  keyframe.tracked.T_odom_sensor = T_map_sensor;
   keyframe.measurement = {
       Image<float>(sensor.Rows(), sensor.Columns(), range_m),
       Image<Eigen::Vector3f>(sensor.Rows(), sensor.Columns(), Eigen::Vector3f::Zero())};

@@ -1,0 +1,101 @@
+#include "covsplat/loops/loop_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Cholesky>
+
+#include "covsplat/registration/gicp.hpp"
+
+namespace covsplat {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+/// The gate becomes smaller by this with every registration.
+constexpr double kNarrowing = 2.0;
+
+GicpConfig RigidGicp(double gate_m, const LoopCheckConfig& config) {
+  GicpConfig gicp;
+  gicp.motion_model = MotionModel::kRigid;
+  gicp.max_correspondence_m = gate_m;
+  gicp.inlier_distance_m = config.inlier_distance_m;
+  gicp.degeneracy_ratio = 0.05;
+  gicp.hold_ratio = 0.01;
+  gicp.max_iterations = 30;
+  return gicp;
+}
+
+AlignResult AlignMoreAndMoreClosely(const SourceCloud& source,
+                                    const RegistrationTarget& target,
+                                    const SE3& guess,
+                                    double reach_m,
+                                    const LoopCheckConfig& config,
+                                    ThreadPool& pool) {
+  MotionPrediction prediction;
+  prediction.motion.T_map_sensor = guess;
+  AlignResult align;
+  for (double gate_m = std::max(reach_m, config.max_correspondence_m);;
+       gate_m = std::max(gate_m / kNarrowing, config.max_correspondence_m)) {
+    align = Align(source, target, prediction, RigidGicp(gate_m, config), pool);
+    if (gate_m <= config.max_correspondence_m || align.iterations == 0) return align;
+    prediction.motion.T_map_sensor = align.motion.T_map_sensor;
+  }
+}
+
+Eigen::Matrix3d WithoutDirections(const std::vector<Eigen::Vector3d>& directions) {
+  Eigen::Matrix3d projection = Eigen::Matrix3d::Identity();
+  for (const Eigen::Vector3d& d : directions) projection -= d * d.transpose();
+  return projection;
+}
+
+/// That of the registration less what it does not hold, and no more than the configured deviations
+/// allow: (I^-1 + S)^-1, which is written so that I need not have an inverse.
+Matrix6d InformationOf(const AlignResult& align, const LoopCheckConfig& config) {
+  Matrix6d held = Matrix6d::Zero();
+  held.topLeftCorner<3, 3>() = WithoutDirections(align.weak_rotations);
+  held.bottomRightCorner<3, 3>() = WithoutDirections(align.weak_translations);
+  const Matrix6d measured = held * align.information * held;
+  const double rad = std::max(config.sigma_deg * kDegree, 1e-6);
+  const double m = std::max(config.sigma_m, 1e-6);
+  Vector6d most;
+  most << Eigen::Vector3d::Constant(1.0 / (rad * rad)), Eigen::Vector3d::Constant(1.0 / (m * m));
+  Matrix6d sum = measured;
+  sum.diagonal() += most;
+  const Matrix6d information = measured - measured * sum.ldlt().solve(measured);
+  return 0.5 * (information + information.transpose());
+}
+
+LoopFate FateOf(const LoopCheck& check, const LoopCheckConfig& config) {
+  if (check.overlap < config.min_overlap) return LoopFate::kLittleOverlap;
+  if (check.rms_m > config.max_rms_m) return LoopFate::kPoorFit;
+  if (check.seen_through > config.max_seen_through) return LoopFate::kSeenThrough;
+  return LoopFate::kAlone;
+}
+
+}  // namespace
+
+LoopCheck CheckLoop(const LocalMap& fresh,
+                    const LocalMap& old,
+                    const SE3& T_old_new_guess,
+                    double reach_m,
+                    const LoopCheckConfig& config,
+                    ThreadPool& pool) {
+  const SourceCloud source = SourceOf(fresh, config.voxel_m);
+  const RegistrationTarget target = TargetOf(old, config.voxel_m);
+  const AlignResult align =
+      AlignMoreAndMoreClosely(source, target, T_old_new_guess, reach_m, config, pool);
+  LoopCheck check;
+  check.T_old_new = align.motion.T_map_sensor;
+  check.moved_m = (check.T_old_new.Translation() - T_old_new_guess.Translation()).norm();
+  if (align.correspondences == 0) return check;
+  check.information = InformationOf(align, config);
+  check.overlap = align.inlier_ratio;
+  check.rms_m = align.rms_residual_m;
+  check.seen_through = std::max(SeenThroughShare(fresh, old, check.T_old_new),
+                                SeenThroughShare(old, fresh, check.T_old_new.Inverse()));
+  check.fate = FateOf(check, config);
+  return check;
+}
+
+}  // namespace covsplat

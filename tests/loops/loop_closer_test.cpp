@@ -1,0 +1,99 @@
+#include "covsplat/loops/loop_closer.hpp"
+
+#include <cstdio>
+
+#include "tests/loops/block_city.hpp"
+#include <gtest/gtest.h>
+
+namespace covsplat::test {
+namespace {
+
+constexpr double kStepM = 2.0;
+constexpr int kLap = 100;  // keyframes
+
+class LoopCloserTest : public ::testing::Test {
+ protected:
+  /// Keyframes round the block with odometry that always errs the same way.
+  void Drive(LoopCloser& closer, int keyframes, const Vector6d& error_per_step) {
+    SE3 T_odom = RoundTheBlock(0.0);
+    for (int k = 0; k < keyframes; ++k) {
+      const SE3 truth = RoundTheBlock(kStepM * k);
+      if (k > 0) {
+        T_odom =
+            T_odom * (RoundTheBlock(kStepM * (k - 1)).Inverse() * truth) * SE3::Exp(error_per_step);
+      }
+      LoopKeyframe keyframe;
+      keyframe.T_odom_keyframe = T_odom;
+      keyframe.place = PlaceAt(city_, k, truth, 1000 + static_cast<std::uint64_t>(k), pool_);
+      corrections_ += closer.Add(std::move(keyframe)) ? 1 : 0;
+    }
+    T_odom_last_ = T_odom;
+  }
+
+  static Vector6d Drift(double turn_rad, double climb_m) {
+    return (Vector6d() << 0.0, 0.0, turn_rad, 0.0, 0.0, climb_m).finished();
+  }
+
+  static int Count(const LoopCloser& closer, LoopFate fate) {
+    return static_cast<int>(std::ranges::count_if(
+        closer.Loops(), [&](const LoopRecord& loop) { return loop.check.fate == fate; }));
+  }
+
+  ThreadPool pool_{2};
+  const RayScene city_ = BlockCity();
+  int corrections_ = 0;
+  SE3 T_odom_last_;
+};
+
+TEST_F(LoopCloserTest, ALapThatDriftedIsClosed) {
+  LoopCloser closer({}, pool_);
+  Drive(closer, kLap + 20, Drift(2e-4, 0.004));
+  const double drift = TranslationError(T_odom_last_, RoundTheBlock(kStepM * (kLap + 19)));
+  double worst = 0.0;
+  for (int k = 0; k < kLap + 20; ++k) {
+    worst = std::max(
+        worst,
+        TranslationError(closer.Poses()[static_cast<std::size_t>(k)], RoundTheBlock(kStepM * k)));
+  }
+  std::printf("drift %.2f m, afterwards %.3f m at most; %zu looked at, %d accepted\n",
+              drift,
+              worst,
+              closer.Loops().size(),
+              Count(closer, LoopFate::kAccepted));
+  EXPECT_GT(drift, 0.6);
+  EXPECT_GE(Count(closer, LoopFate::kAccepted), 2);
+  EXPECT_GE(corrections_, 1);
+  // Where the lap meets itself it fits.
+  for (int k = kLap; k < kLap + 20; ++k) {
+    const SE3& second = closer.Poses()[static_cast<std::size_t>(k)];
+    const SE3& first = closer.Poses()[static_cast<std::size_t>(k - kLap)];
+    EXPECT_LT(TranslationError(first, second), 0.05) << k;
+  }
+  EXPECT_LT(worst, 0.5 * drift);
+}
+
+TEST_F(LoopCloserTest, WithoutDriftNothingMoves) {
+  LoopCloser closer({}, pool_);
+  Drive(closer, kLap + 10, Drift(0.0, 0.0));
+  EXPECT_GE(Count(closer, LoopFate::kAccepted), 2);
+  for (int k = 0; k < kLap + 10; ++k) {
+    EXPECT_LT(
+        TranslationError(closer.Poses()[static_cast<std::size_t>(k)], RoundTheBlock(kStepM * k)),
+        0.02);
+  }
+}
+
+TEST_F(LoopCloserTest, NoLoopIsFarFromWhatOdometryAllows) {
+  LoopConfig config;
+  config.search.drift_percent = 0.01;
+  config.search.drift_m = 0.05;
+  config.looks.enabled = false;
+  LoopCloser closer(config, pool_);
+  Drive(closer, kLap + 10, Drift(2e-4, 0.004));
+  EXPECT_EQ(Count(closer, LoopFate::kAccepted), 0);
+  EXPECT_GE(Count(closer, LoopFate::kTooFar), 1);
+  EXPECT_EQ(corrections_, 0);
+}
+
+}  // namespace
+}  // namespace covsplat::test
