@@ -5,6 +5,7 @@
 #include <ctime>
 #include <limits>
 
+#include "apps/loop_log.hpp"
 #include "apps/run_log.hpp"
 #include "apps/system_info.hpp"
 #include <fmt/format.h>
@@ -43,6 +44,29 @@ void AddTrajectory(const SlamSystem& system, const RunResults& results, ReportDa
   for (const std::int64_t scan : system.KeyframeScans()) {
     data.keyframes.push_back(RecordOf(results, scan));
   }
+}
+
+/// Where loops were looked for and found; the rest is in loops.csv.
+void AddLoops(const SlamSystem& system, const RunResults& results, ReportData& data) {
+  if (system.Loops() == nullptr) return;
+  for (const LoopRecord& loop : system.Loops()->Loops()) {
+    std::vector<std::size_t>& marks =
+        loop.check.fate == LoopFate::kAccepted ? data.loops_closed : data.loops_rejected;
+    for (const int keyframe : {loop.old_keyframe, loop.new_keyframe}) {
+      marks.push_back(
+          RecordOf(results, system.KeyframeScans()[static_cast<std::size_t>(keyframe)]));
+    }
+  }
+}
+
+/// How many loops had which fate.
+std::string FatesOf(const LoopCloser& loops) {
+  std::string text;
+  for (const auto& [fate, name] : EnumNames<LoopFate>::kNames) {
+    const std::int64_t count = CountLoops(loops, fate);
+    if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, name);
+  }
+  return text.empty() ? "no place was seen again" : text;
 }
 
 /// Truth in the map frame, and how far the estimate is from it along the path.
@@ -144,7 +168,7 @@ std::string SpreadOf(const HeldOutErrors& errors) {
                      FormatMetres(errors.p95_abs_m));
 }
 
-void AddDetails(const RunResults& results, ReportData& data) {
+void AddDetails(const SlamSystem& system, const RunResults& results, ReportData& data) {
   const double keyframes = std::max<double>(1.0, static_cast<double>(results.keyframes));
   data.details = {{"sensor", results.sensor_verdict},
                   {"machine", MachineName()},
@@ -167,6 +191,7 @@ void AddDetails(const RunResults& results, ReportData& data) {
                                           feed.backwards,
                                           results.without_pose));
   }
+  if (system.Loops() != nullptr) data.details.emplace_back("loops", FatesOf(*system.Loops()));
   if (const auto means = MeansOf(results.held_out)) {
     data.details.emplace_back(
         "held-out coverage",
@@ -191,6 +216,7 @@ ReportData ReportOf(const SlamSystem& system,
   data.subtitle = fmt::format("{}, {}", results.source, TodayAsText());
   data.summary = SummaryOf(results);
   AddTrajectory(system, results, data);
+  AddLoops(system, results, data);
   AddTruth(results, data);
   for (const MapPicture& p : results.pictures) data.map_pictures.push_back({p.caption, p.image});
   AddHeldOut(results, data);
@@ -200,7 +226,7 @@ ReportData ReportOf(const SlamSystem& system,
   data.version = COVSPLAT_VERSION;
   data.command_line = results.command_line;
   data.input = fmt::format("{}: {}", results.recording.string(), results.source);
-  AddDetails(results, data);
+  AddDetails(system, results, data);
   return data;
 }
 

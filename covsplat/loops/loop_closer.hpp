@@ -186,6 +186,8 @@ class LoopCloser {
   const PoseGraph& Graph() const { return graph_; }
   const std::vector<SE3>& Poses() const { return graph_.T_map_node; }
   const std::vector<LoopRecord>& Loops() const { return loops_; }
+  /// Whether any was accepted.
+  bool HasLoops() const { return graph_.edges.size() + 1 > graph_.T_map_node.size(); }
 
  private:
   /// What lies between a keyframe and all others, by the way that drifts least.

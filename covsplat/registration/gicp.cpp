@@ -65,7 +65,12 @@ class Aligner {
         pool_(pool),
         unknowns_(Unknowns(config.motion_model, source.duration_s)),
         prior_(prediction, source.duration_s, config),
-        residuals_(source, target, Gate(prediction, config), config.inlier_distance_m, pool) {
+        residuals_(source,
+                   target,
+                   Gate(prediction, config),
+                   config.inlier_distance_m,
+                   config.same_side,
+                   pool) {
     result_.motion = prediction.motion;
   }
 

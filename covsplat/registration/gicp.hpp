@@ -24,6 +24,7 @@ struct GicpConfig {
   double degeneracy_ratio = 0.02;
   double hold_ratio = 0.002;
   MotionModel motion_model = MotionModel::kAcceleration;  ///< the tracker takes `deskew.refine`
+  bool same_side = true;
   double angular_acceleration_radps2 = 8.0;
   double linear_acceleration_mps2 = 4.0;
   double points_per_measurement = 8.0;
@@ -35,6 +36,9 @@ struct GicpConfig {
             Range{0.01, 20.0},
             "match points to surfels nearer than this, and up to twice as far where the prediction "
             "reaches far ahead");
+    v.Field("same_side",
+            c.same_side,
+            "do not match surfaces that face opposite ways: the two sides of a wall or a floor");
     v.Field("max_iterations", c.max_iterations, Range{1, 200}, "Gauss-Newton steps at most");
     v.Field("rotation_epsilon_rad",
             c.rotation_epsilon_rad,

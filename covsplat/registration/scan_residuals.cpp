@@ -11,6 +11,8 @@ namespace {
 
 constexpr std::size_t kGrain = 512;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+/// Cosine of the angle between the normals of the two sides of a wall, and less.
+constexpr float kOpposite = -0.9f;
 
 using Packed3 = Eigen::Matrix<float, 6, 1>;  // xx xy xz yy yz zz
 
@@ -132,11 +134,13 @@ ScanResiduals::ScanResiduals(const SourceCloud& source,
                              const RegistrationTarget& target,
                              double gate_m,
                              double inlier_distance_m,
+                             bool same_side,
                              ThreadPool& pool)
     : source_(source),
       target_(target),
       squared_gate_(static_cast<float>(gate_m * gate_m)),
       inlier_distance_m_(static_cast<float>(inlier_distance_m)),
+      same_side_(same_side),
       covariance_(source.Size()),
       slot_(source.Size(), -1),
       squared_distance_(source.Size(), kInfinity),
@@ -204,6 +208,13 @@ PhaseMoments ScanResiduals::SumChunk(const Frame& frame, std::size_t begin, std:
       continue;
     }
     const RegistrationTarget::Record& surfel = target_.At(slot_[i]);
+    if (same_side_) {
+      const Eigen::Vector3f normal = pose.rotation * source_.covariance[i].axes.col(2);
+      if (normal.dot(surfel.normal) <= kOpposite) {
+        mahalanobis_[i] = kInfinity;
+        continue;
+      }
+    }
     const Eigen::Vector3f e = surfel.mean - position;
     const Eigen::Matrix3f c = Unpack(surfel.covariance) +
                               pose.rotation * Unpack(covariance_[i]) * pose.rotation.transpose();

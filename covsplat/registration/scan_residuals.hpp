@@ -60,6 +60,7 @@ class ScanResiduals {
                 const RegistrationTarget& target,
                 double gate_m,
                 double inlier_distance_m,
+                bool same_side,
                 ThreadPool& pool);
 
   /// Finds the nearest surfels and sums up the matches of every `stride`-th point. The robust
@@ -85,6 +86,7 @@ class ScanResiduals {
   const RegistrationTarget& target_;
   const float squared_gate_;
   const float inlier_distance_m_;
+  const bool same_side_;
   std::vector<Eigen::Matrix<float, 6, 1>> covariance_;  // [N] sensor frame at the point's time
   std::vector<int> slot_;                               // [N] nearest surfel, -1 if none
   std::vector<float> squared_distance_;                 // [N]

@@ -62,6 +62,8 @@ struct ReportData {
   std::vector<Eigen::Vector3d> trajectory_m;  ///< per scan, in the map frame
   std::vector<Eigen::Vector3d> truth_m;       ///< aligned to the map frame
   std::vector<std::size_t> keyframes;         ///< indices into trajectory_m
+  std::vector<std::size_t> loops_closed;      ///< where places were known again, as indices
+  std::vector<std::size_t> loops_rejected;    ///< and where a look showed that they were not
   std::vector<double> drift_path_m;           ///< path length ...
   std::vector<double> drift_m;                ///< ... and position error there
 

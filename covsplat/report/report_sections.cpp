@@ -35,11 +35,28 @@ Series View(const std::vector<Eigen::Vector3d>& path, int x_axis, int y_axis) {
   return series;
 }
 
+Series Marks(const ReportData& data,
+             const std::vector<std::size_t>& at,
+             const std::string& name,
+             int color,
+             int x_axis,
+             int y_axis) {
+  std::vector<Eigen::Vector3d> places;
+  for (const std::size_t i : at) {
+    if (i < data.trajectory_m.size()) places.push_back(data.trajectory_m[i]);
+  }
+  Series series = View(places, x_axis, y_axis);
+  series.name = name;
+  series.style = Series::Style::kPoints;
+  series.color = color;
+  return series;
+}
+
 std::string TrajectoryPlot(const ReportData& data,
                            const PlotOptions& options,
                            int x_axis,
                            int y_axis) {
-  constexpr int kTrack = 0, kKeyframe = 1, kTruth = 2;
+  constexpr int kTrack = 0, kKeyframe = 1, kTruth = 2, kClosed = 3, kRejected = 4;
   std::vector<Series> curves;
   if (!data.truth_m.empty()) {
     curves.push_back(View(data.truth_m, x_axis, y_axis));
@@ -50,16 +67,13 @@ std::string TrajectoryPlot(const ReportData& data,
   curves.push_back(View(data.trajectory_m, x_axis, y_axis));
   curves.back().name = "covsplat";
   curves.back().color = kTrack;
-  std::vector<Eigen::Vector3d> keyframes;
-  for (const std::size_t i : data.keyframes) {
-    if (i < data.trajectory_m.size()) keyframes.push_back(data.trajectory_m[i]);
-  }
-  if (!keyframes.empty()) {
-    curves.push_back(View(keyframes, x_axis, y_axis));
-    curves.back().name = "keyframes";
-    curves.back().style = Series::Style::kPoints;
-    curves.back().color = kKeyframe;
-  }
+  const auto mark = [&](const std::vector<std::size_t>& at, const char* name, int color) {
+    Series marks = Marks(data, at, name, color, x_axis, y_axis);
+    if (marks.Size() > 0) curves.push_back(std::move(marks));
+  };
+  mark(data.keyframes, "keyframes", kKeyframe);
+  mark(data.loops_rejected, "looked at, no loop", kRejected);
+  mark(data.loops_closed, "loops", kClosed);
   return PlotSvg(options, curves);
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "covsplat/loops/loop_closer.hpp"
+#include "covsplat/loops/stitch.hpp"
 #include "covsplat/mapping/mapper.hpp"
 #include "covsplat/slam/tracker.hpp"
 
@@ -69,11 +70,13 @@ struct EnumNames<LoopMode> {
 struct LoopsConfig {
   LoopMode mode = LoopMode::kOff;
   LoopConfig closer;
+  StitchConfig stitch;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
     v.Field("mode", c.mode, "when places that are seen again correct the map");
     LoopConfig::Visit(c.closer, v);
+    v.Section("stitch", c.stitch, "passes of the same surfaces, refined against each other");
   }
 };
 

@@ -1,6 +1,7 @@
 #include "covsplat/slam/slam_system.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "covsplat/core/check.hpp"
@@ -38,6 +39,31 @@ ScanRecord MakeRecord(const TrackResult& result) {
   record.degenerate_directions = result.align.degenerate_directions;
   record.times = result.times;
   return record;
+}
+
+/// Gaussians as flat pieces of surface.
+std::vector<AnchoredSurfel> SurfelsOf(const GaussianMap& map) {
+  const GaussianColumns<float>& table = map.Engine().Gaussians();
+  std::vector<AnchoredSurfel> surfels;
+  for (const AnchorRange& range : map.Engine().Ranges()) {
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      const Eigen::Vector3f normal = RotationOf(table, i).normalized() * Eigen::Vector3f::UnitZ();
+      if (!MeanOf(table, i).allFinite() || !normal.allFinite()) continue;
+      surfels.push_back({range.anchor, MeanOf(table, i), normal});
+    }
+  }
+  return surfels;
+}
+
+/// From the first keyframe to each.
+std::vector<double> WaysAlong(const std::vector<SE3>& T_map_keyframe) {
+  std::vector<double> way_m;
+  for (std::size_t k = 0; k < T_map_keyframe.size(); ++k) {
+    const SE3& before = T_map_keyframe[k > 0 ? k - 1 : 0];
+    const double step_m = (T_map_keyframe[k].Translation() - before.Translation()).norm();
+    way_m.push_back((way_m.empty() ? 0.0 : way_m.back()) + step_m);
+  }
+  return way_m;
 }
 
 LoopKeyframe LoopKeyframeOf(int keyframe, const TrackedScan& tracked, double voxel_m) {
@@ -183,6 +209,29 @@ void SlamSystem::Correct() {
   T_map_odom_.Publish(std::make_shared<const SE3>(*mapper_.T_map_odom()));
 }
 
+// Loops are known to centimetres; the surfaces that two passes share say more.
+void SlamSystem::StitchPasses() {
+  const LoopsConfig& config = config_.loops;
+  if (!loops_ || !config.stitch.enabled || !loops_->Closer().HasLoops()) return;
+  const ScopedTimer timer(mapper_times_, "stitch");
+  PoseGraph graph = loops_->Closer().Graph();
+  const std::vector<AnchoredSurfel> surfels = SurfelsOf(std::as_const(mapper_).Map());
+  const std::vector<double> way_m = WaysAlong(graph.T_map_node);
+  const std::size_t known = graph.edges.size();
+  for (int round = 0; round < config.stitch.rounds; ++round) {
+    graph.edges.resize(known);
+    std::ranges::move(StitchEdges(surfels,
+                                  graph.T_map_node,
+                                  way_m,
+                                  config.closer.search.min_way_m,
+                                  config.stitch,
+                                  *map_pool_),
+                      std::back_inserter(graph.edges));
+    graph.T_map_node = Optimize(graph, config.closer.graph).T_map_node;
+  }
+  mapper_.Correct(graph.T_map_node);
+}
+
 void SlamSystem::PublishTarget() {
   gaussians_ = mapper_.Map().Size();
   mapper_steps_ = mapper_.Steps();
@@ -238,6 +287,7 @@ void SlamSystem::Finish() {
   if (mapper_thread_.joinable()) mapper_thread_.join();
   if (loops_) loops_->Finish();
   Correct();
+  StitchPasses();
   AddTimes(mapper_times_, last_times);
   mapper_.Conclude();
   AddTimes(mapper_times_, mapper_.TakeTimes());
@@ -261,8 +311,7 @@ SE3 SlamSystem::PoseOf(std::int64_t scan) const {
   if (after == keyframe_scans_.begin()) return as_seen_from(after);
   const auto before = std::prev(after);
   if (after == keyframe_scans_.end()) return as_seen_from(before);
-  const double share =
-      static_cast<double>(scan - *before) / static_cast<double>(*after - *before);
+  const double share = static_cast<double>(scan - *before) / static_cast<double>(*after - *before);
   return Interpolate(as_seen_from(before), as_seen_from(after), share);
 }
 

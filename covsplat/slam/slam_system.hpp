@@ -93,6 +93,7 @@ class SlamSystem {
   void MapKeyframe(TrackedScan keyframe, StageTimes& times);
   void MapperLoop();
   void Correct();
+  void StitchPasses();
   void PublishTarget();
   SE3 OdometryPoseOf(std::int64_t scan) const;
   bool MaybeHoldOut(const TrackResult& result);

@@ -122,6 +122,18 @@ TEST_F(LoopCheckTest, AlongACorridorNothingIsKnown) {
   EXPECT_LT(check.information(3, 3), 1.0);
 }
 
+// The ceiling of one storey is a hand's breadth below the floor of the next.
+TEST_F(LoopCheckTest, TheOtherSideOfAFloorIsAnotherPlace) {
+  const RayScene below({{{-8.0, -6.0, -1.5}, {8.0, 6.0, 1.5}}});
+  const RayScene above({{{-8.0, -6.0, 1.75}, {8.0, 6.0, 4.75}}});
+  const Place old = PlaceAt(below, 0, SE3(), 1, pool_);
+  const Place fresh = PlaceAt(above, 1, MakePose(0.0, 0.0, 0.0, 0.0, 0.0, 3.25), 2, pool_);
+  const LoopCheck check = CheckLoop(
+      {{&fresh, SE3()}}, {{&old, SE3()}}, MakePose(0.0, 0.0, 0.0, 0.0, 0.0, 3.1), 0.6, {}, pool_);
+  EXPECT_EQ(check.fate, LoopFate::kLittleOverlap);
+  EXPECT_LT(check.overlap, 0.1);
+}
+
 TEST_F(LoopCheckTest, NothingMatchesNothing) {
   const Place empty;
   const LoopCheck check = CheckLoop({{&empty, SE3()}}, {{&empty, SE3()}}, SE3(), 1.0, {}, pool_);

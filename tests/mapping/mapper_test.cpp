@@ -202,5 +202,49 @@ TEST_F(MapperTest, MakesTargetsOfTheKeyframesThatItHas) {
   EXPECT_EQ(first->Keyframes(), 1);
 }
 
+TEST_F(MapperTest, ACorrectionMovesGaussiansWithTheirKeyframesAndNothingForTheTracker) {
+  const auto mapper = MakeMapper(Frozen());
+  for (int k = 0; k < 4; ++k) mapper->Insert(KeyframeAt(k));
+  const auto pose = [&](int k) { return mapper->Map().KeyframePose(k); };
+  const auto seen_from = [&](int k) { return mapper->Map().Near(pose(k), 100.0); };
+  const NearGaussians before = seen_from(1);
+  const auto target = mapper->MakeTarget(PoseOfKeyframe(3));
+  EXPECT_FALSE(mapper->T_map_odom());
+
+  // A loop moves the first three, each otherwise; the fourth goes with the third.
+  std::vector<SE3> corrected;
+  for (int k = 0; k < 3; ++k)
+    corrected.push_back(MakePose(0, 0, 0.01 * k, 0.3, 0.1 * k, 0) * pose(k));
+  const SE3 T_third_fourth = pose(2).Inverse() * pose(3);
+  mapper->Correct(corrected);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_LT(TranslationError(pose(k), corrected[static_cast<std::size_t>(k)]), 1e-12);
+  }
+  EXPECT_LT(TranslationError(pose(3), corrected[2] * T_third_fourth), 1e-12);
+
+  // What came with a keyframe has not moved as that one sees it.
+  const NearGaussians after = seen_from(1);
+  ASSERT_EQ(after.discs.size(), before.discs.size());
+  std::size_t of_the_second = 0;
+  for (std::size_t i = 0; i < after.discs.size(); ++i) {
+    if (after.keyframe[i] != 1) continue;
+    ++of_the_second;
+    EXPECT_LT((after.discs[i].mean - before.discs[i].mean).norm(), 1e-4f);
+  }
+  EXPECT_GT(of_the_second, 10u);
+
+  // In the frame of odometry the newest keyframe and what came with it are where they were.
+  ASSERT_TRUE(mapper->T_map_odom());
+  EXPECT_LT(TranslationError(*mapper->T_map_odom() * PoseOfKeyframe(3), pose(3)), 1e-9);
+  const auto moved = mapper->MakeTarget(PoseOfKeyframe(3));
+  ASSERT_EQ(moved->Size(), target->Size());
+  EXPECT_LT((moved->OriginMap() - target->OriginMap()).norm(), 1e-9);
+
+  // Scans go on in that frame, and arrive in the map beside those before.
+  mapper->Insert(KeyframeAt(4));
+  const SE3 step = PoseOfKeyframe(3).Inverse() * PoseOfKeyframe(4);
+  EXPECT_LT(TranslationError(pose(3).Inverse() * pose(4), step), 1e-9);
+}
+
 }  // namespace
 }  // namespace covsplat::test

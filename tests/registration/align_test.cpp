@@ -188,5 +188,22 @@ TEST(Align, IgnoresWhatWasNotThereBefore) {
   EXPECT_LT(RotationError(result.motion.T_map_sensor, kTruth), 1e-3);
 }
 
+// A scan of the storey above a map of the one below: the floor is the ceiling's other side.
+TEST(Align, TheTwoSidesOfAFloorAreNotOneSurface) {
+  ThreadPool pool(2);
+  const RayScene below({{{-1e4, -1e4, -1.5}, {1e4, 1e4, 1.5}}});
+  const RayScene above({{{-1e4, -1e4, 1.75}, {1e4, 1e4, 4.75}}});
+  const SE3 pose = MakePose(0.0, 0.0, 0.0, 0.0, 0.0, 3.25);
+  const RegistrationTarget target = TargetFrom(StillCloud(below, SE3(), 0.01, 1, pool));
+  const SourceCloud source = StillCloud(above, pose, 0.01, 2, pool);
+  GicpConfig config;
+  const AlignResult apart = Align(source, target, At(pose), config, pool);
+  config.same_side = false;
+  const AlignResult joined = Align(source, target, At(pose), config, pool);
+  EXPECT_LT(apart.inlier_ratio, 0.05);
+  EXPECT_GT(joined.inlier_ratio, 0.3);
+  EXPECT_GT(TranslationError(joined.motion.T_map_sensor, pose), 0.2);  // drawn to the ceiling
+}
+
 }  // namespace
 }  // namespace covsplat::test

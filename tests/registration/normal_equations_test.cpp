@@ -82,7 +82,7 @@ class FrozenCost {
 TEST_F(NormalEquationsTest, GradientAndHessianOfAll18UnknownsAgreeWithCentralDifferences) {
   constexpr double kNoKernel = 1e12;
   constexpr double kStep = 1e-4;
-  ScanResiduals residuals(source_, target_, 1.0, 0.1, pool_);
+  ScanResiduals residuals(source_, target_, 1.0, 0.1, false, pool_);
   const PhaseMoments moments = residuals.Evaluate(motion_, kNoKernel, 1, pool_);
   ASSERT_GT(moments.matches, 1000u);
   const NormalEquations analytic = Assemble(moments, motion_);
