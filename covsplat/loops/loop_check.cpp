@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include <Eigen/Cholesky>
 
@@ -41,6 +43,31 @@ AlignResult AlignMoreAndMoreClosely(const SourceCloud& source,
     if (gate_m <= config.max_correspondence_m || align.iterations == 0) return align;
     prediction.motion.T_map_sensor = align.motion.T_map_sensor;
   }
+}
+
+/// Along streets and corridors there are many ways to fit halfway: of several beginnings the one
+/// counts after which most overlaps.
+AlignResult AlignFromAround(const SourceCloud& source,
+                            const RegistrationTarget& target,
+                            const SE3& guess,
+                            double reach_m,
+                            const LoopCheckConfig& config,
+                            ThreadPool& pool) {
+  std::vector<Eigen::Vector3d> offsets = {Eigen::Vector3d::Zero()};
+  if (reach_m > config.max_correspondence_m) {
+    for (const double sign : {0.25, -0.25}) {
+      offsets.push_back(sign * reach_m * Eigen::Vector3d::UnitX());
+      offsets.push_back(sign * reach_m * Eigen::Vector3d::UnitY());
+    }
+  }
+  AlignResult best;
+  for (const Eigen::Vector3d& offset : offsets) {
+    const SE3 begin = guess * SE3(Eigen::Quaterniond::Identity(), offset);
+    AlignResult align = AlignMoreAndMoreClosely(
+        source, target, begin, std::max(0.5 * reach_m, config.max_correspondence_m), config, pool);
+    if (offset.isZero() || align.inlier_ratio > best.inlier_ratio) best = std::move(align);
+  }
+  return best;
 }
 
 Eigen::Matrix3d WithoutDirections(const std::vector<Eigen::Vector3d>& directions) {
@@ -83,8 +110,7 @@ LoopCheck CheckLoop(const LocalMap& fresh,
                     ThreadPool& pool) {
   const SourceCloud source = SourceOf(fresh, config.voxel_m);
   const RegistrationTarget target = TargetOf(old, config.voxel_m);
-  const AlignResult align =
-      AlignMoreAndMoreClosely(source, target, T_old_new_guess, reach_m, config, pool);
+  const AlignResult align = AlignFromAround(source, target, T_old_new_guess, reach_m, config, pool);
   LoopCheck check;
   check.T_old_new = align.motion.T_map_sensor;
   check.moved_m = (check.T_old_new.Translation() - T_old_new_guess.Translation()).norm();

@@ -22,7 +22,7 @@ struct LoopSearchConfig {
   double place_turn_deg = 30.0;
   double new_way_m = 10.0;
   double old_way_m = 15.0;
-  double agree_m = 0.15;
+  double agree_m = 0.1;
   double agree_deg = 1.0;
 
   template <class Self, class V>
@@ -110,8 +110,8 @@ struct LoopLooksConfig {
 
 /// How sure the way from one keyframe to the next is.
 struct OdometryNoiseConfig {
-  double sigma_m = 0.005;
-  double sigma_deg = 0.015;
+  double sigma_m = 0.01;
+  double sigma_deg = 0.05;
   double weak_sigma_m = 0.1;
   double weak_sigma_deg = 0.3;
 

@@ -84,6 +84,7 @@ Lap RunLap(LoopMode mode, Schedule schedule, int threads) {
   config.system.schedule = schedule;
   config.system.threads = threads;
   config.loops.mode = mode;
+  config.loops.closer.search.drift_percent = 1.0;  // bent as the world is
   config.mapper.schedule.steps_new = config.mapper.schedule.steps_near = 2;
   config.mapper.feedback.max_keyframe_age =
       20;  // the first lap is not what the second is tracked by
