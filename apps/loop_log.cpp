@@ -5,19 +5,12 @@
 
 #include <fmt/format.h>
 
+#include "covsplat/core/enum_name.hpp"
 #include "covsplat/io/output_file.hpp"
 #include "covsplat/loops/g2o_file.hpp"
 
 namespace covsplat {
 namespace {
-
-template <class E>
-std::string_view NameOf(E wanted) {
-  for (const auto& [value, name] : EnumNames<E>::kNames) {
-    if (value == wanted) return name;
-  }
-  return "unknown";
-}
 
 std::string Row(const LoopRecord& loop, std::span<const std::int64_t> keyframe_scans) {
   return fmt::format("{},{},{},{},{},{:.2f},{:.3f},{:.4f},{:.4f},{:.4f},{:.3f},{}\n",
@@ -25,14 +18,14 @@ std::string Row(const LoopRecord& loop, std::span<const std::int64_t> keyframe_s
                      loop.new_keyframe,
                      keyframe_scans[static_cast<std::size_t>(loop.old_keyframe)],
                      keyframe_scans[static_cast<std::size_t>(loop.new_keyframe)],
-                     NameOf(loop.hint),
+                     NameOfEnum(loop.hint),
                      loop.way_m,
                      loop.drift_m,
                      loop.check.overlap,
                      loop.check.rms_m,
                      loop.check.seen_through,
                      loop.check.moved_m,
-                     NameOf(loop.check.fate));
+                     NameOfEnum(loop.check.fate));
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include "covsplat/config/config.hpp"
+#include "covsplat/core/enum_name.hpp"
 #include "covsplat/io/trajectory_file.hpp"
 
 namespace covsplat {
@@ -83,9 +84,7 @@ void DescribeRun(const RunRequest& request, const SlamSystem& running, RunResult
   results.title = request.title.empty() ? NameOf(request.recording) : request.title;
   results.command_line = request.command_line;
   results.threads = system.threads > 0 ? system.threads : CpuCount();
-  for (const auto& [value, name] : EnumNames<Schedule>::kNames) {
-    if (value == system.schedule) results.schedule = name;
-  }
+  results.schedule = NameOfEnum(system.schedule);
   results.backend = running.GetMapper().Map().Engine().Device();
 }
 

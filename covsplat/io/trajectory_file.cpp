@@ -30,10 +30,9 @@ bool AllFinite(std::span<const double> numbers) {
 }
 
 std::optional<TimedPose> TumPose(std::span<const double> n) {
-  if (n.size() != 8 || !AllFinite(n)) return std::nullopt;
-  const Eigen::Quaterniond rotation(n[7], n[4], n[5], n[6]);
-  if (std::abs(rotation.norm() - 1.0) > kRotationTolerance) return std::nullopt;
-  return TimedPose{n[0], SE3(rotation, {n[1], n[2], n[3]})};
+  if (n.empty() || !std::isfinite(n[0])) return std::nullopt;
+  const std::optional<SE3> pose = ParsePose(n.subspan(1));
+  return pose ? std::optional(TimedPose{n[0], *pose}) : std::nullopt;
 }
 
 // "2011-09-26 13:02:25.594360375", as KITTI's raw recordings have it, in seconds since 1970 (UTC).
@@ -83,18 +82,21 @@ Result<void> ForEachLine(const std::filesystem::path& path, Take&& take) {
 
 }  // namespace
 
+std::string PoseText(const SE3& pose) {
+  const Eigen::Vector3d& t = pose.Translation();
+  const Eigen::Quaterniond& q = pose.Rotation();
+  return fmt::format("{} {} {} {} {} {} {}", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+}
+
+std::optional<SE3> ParsePose(std::span<const double> n) {
+  if (n.size() != 7 || !AllFinite(n)) return std::nullopt;
+  const Eigen::Quaterniond rotation(n[6], n[3], n[4], n[5]);
+  if (std::abs(rotation.norm() - 1.0) > kRotationTolerance) return std::nullopt;
+  return SE3(rotation, {n[0], n[1], n[2]});
+}
+
 std::string TumLine(const TimedPose& pose) {
-  const Eigen::Vector3d& t = pose.T_world_sensor.Translation();
-  const Eigen::Quaterniond& q = pose.T_world_sensor.Rotation();
-  return fmt::format("{:.9f} {} {} {} {} {} {} {}\n",
-                     pose.stamp_s,
-                     t.x(),
-                     t.y(),
-                     t.z(),
-                     q.x(),
-                     q.y(),
-                     q.z(),
-                     q.w());
+  return fmt::format("{:.9f} {}\n", pose.stamp_s, PoseText(pose.T_world_sensor));
 }
 
 std::string KittiLine(const SE3& pose) {

@@ -13,6 +13,12 @@
 
 namespace covsplat {
 
+/// `x y z qx qy qz qw`, exact.
+std::string PoseText(const SE3& pose);
+/// Of these seven numbers; nothing if there are not seven, one is not finite, or the quaternion is
+/// not of unit length (to 1 %; it is normalised).
+std::optional<SE3> ParsePose(std::span<const double> numbers);
+
 /// One line with its end, for files that grow. Numbers but the stamp (nanoseconds) are exact.
 std::string TumLine(const TimedPose& pose);
 std::string KittiLine(const SE3& pose);

@@ -9,11 +9,11 @@
 
 #include "covsplat/io/output_file.hpp"
 #include "covsplat/io/text.hpp"
+#include "covsplat/io/trajectory_file.hpp"
 
 namespace covsplat {
 namespace {
 
-constexpr double kRotationTolerance = 0.01;
 constexpr std::size_t kPoseNumbers = 7;
 constexpr std::size_t kInformationNumbers = 21;
 
@@ -21,12 +21,6 @@ using Words = std::span<const std::string_view>;
 
 // Files have the translation first.
 int InFile(int k) { return (k + 3) % 6; }
-
-std::string PoseText(const SE3& pose) {
-  const Eigen::Vector3d& t = pose.Translation();
-  const Eigen::Quaterniond& q = pose.Rotation();
-  return fmt::format("{} {} {} {} {} {} {}", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
-}
 
 std::string InformationText(const Matrix6d& information) {
   std::string text;
@@ -52,12 +46,9 @@ std::optional<std::vector<double>> Numbers(Words words) {
   return numbers;
 }
 
-std::optional<SE3> ParsePose(Words words) {
-  const auto n = Numbers(words);
-  if (!n || n->size() != kPoseNumbers) return std::nullopt;
-  const Eigen::Quaterniond rotation((*n)[6], (*n)[3], (*n)[4], (*n)[5]);
-  if (std::abs(rotation.norm() - 1.0) > kRotationTolerance) return std::nullopt;
-  return SE3(rotation, {(*n)[0], (*n)[1], (*n)[2]});
+std::optional<SE3> PoseOf(Words words) {
+  const auto numbers = Numbers(words);
+  return numbers ? ParsePose(*numbers) : std::nullopt;
 }
 
 std::optional<Matrix6d> ParseInformation(Words words) {
@@ -90,7 +81,7 @@ struct Lines {
 std::string_view TakeNode(Words words, Lines& lines) {
   if (words.size() != 2 + kPoseNumbers) return "is not a vertex: an id and a pose of 7 numbers";
   const auto id = ParseInteger(words[1]);
-  const auto pose = ParsePose(words.subspan(2));
+  const auto pose = PoseOf(words.subspan(2));
   if (!id || !pose) return "is not a vertex: an id and a pose of 7 numbers";
   if (!lines.nodes.emplace(*id, *pose).second) return "has the id of an earlier vertex";
   return "";
@@ -102,7 +93,7 @@ std::string_view TakeEdge(Words words, std::int64_t line, Lines& lines) {
   if (words.size() != 3 + kPoseNumbers + kInformationNumbers) return kProblem;
   const auto first = ParseInteger(words[1]);
   const auto second = ParseInteger(words[2]);
-  const auto pose = ParsePose(words.subspan(3, kPoseNumbers));
+  const auto pose = PoseOf(words.subspan(3, kPoseNumbers));
   const auto information = ParseInformation(words.subspan(3 + kPoseNumbers));
   if (!first || !second || !pose || !information) return kProblem;
   if (words[0] == "EDGE_SE3_PRIOR") {  // the second id is that of the sensor's offset

@@ -21,7 +21,7 @@ constexpr double kUnreached = std::numeric_limits<double>::infinity();
 constexpr double kSameRevisitM = 50.0;
 /// With less weight than this a loop contradicts the rest of the graph.
 constexpr double kUndoneWeight = 0.1;
-constexpr int kNoLoop = -1;
+constexpr int kOdometry = -1;
 
 double AngleOf(const SE3& pose) { return pose.Log().head<3>().norm(); }
 
@@ -78,7 +78,6 @@ bool LoopCloser::Look(const std::optional<Candidate>& candidate, const Ways& way
 }
 
 void LoopCloser::AddNode(const LoopKeyframe& keyframe) {
-  steps_.emplace_back();
   if (graph_.T_map_node.empty()) {
     graph_.T_map_node.push_back(keyframe.T_odom_keyframe);
     T_odom_newest_ = keyframe.T_odom_keyframe;
@@ -92,24 +91,25 @@ void LoopCloser::AddNode(const LoopKeyframe& keyframe) {
   graph_.T_map_node.push_back(Poses().back() * T_from_to);
   graph_.edges.push_back(
       {from, from + 1, T_from_to, OdometryInformation(way_m, keyframe, config_.odometry)});
-  loop_of_edge_.push_back(kNoLoop);
-  const auto node = static_cast<std::size_t>(from);
-  steps_[node].push_back({from + 1, 0.01 * percent * way_m, way_m});
-  steps_[node + 1].push_back({from, 0.01 * percent * way_m, way_m});
+  links_.push_back({kOdometry, 0.01 * percent * way_m, way_m});
   T_odom_newest_ = keyframe.T_odom_keyframe;
 }
 
 bool LoopCloser::IsPlace(const SE3& T_map_keyframe) const {
   if (places_.empty()) return true;
-  const SE3& T_map_place = Poses()[static_cast<std::size_t>(places_.back().keyframe)];
-  const SE3 moved = T_map_place.Inverse() * T_map_keyframe;
+  const SE3 moved = PoseOf(places_.back()).Inverse() * T_map_keyframe;
   return moved.Translation().norm() >= config_.search.place_spacing_m ||
          AngleOf(moved) >= config_.search.place_turn_deg * kDegree;
 }
 
 /// Dijkstra's shortest paths.
 LoopCloser::Ways LoopCloser::WaysFrom(int keyframe) const {
-  Ways ways{std::vector<double>(steps_.size(), kUnreached), std::vector<double>(steps_.size())};
+  std::vector<std::vector<std::size_t>> edges_at(Poses().size());
+  for (std::size_t e = 0; e < links_.size(); ++e) {
+    edges_at[static_cast<std::size_t>(graph_.edges[e].from)].push_back(e);
+    edges_at[static_cast<std::size_t>(graph_.edges[e].to)].push_back(e);
+  }
+  Ways ways{std::vector<double>(Poses().size(), kUnreached), std::vector<double>(Poses().size())};
   using Entry = std::pair<double, int>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
   ways.drift_m[static_cast<std::size_t>(keyframe)] = 0.0;
@@ -117,14 +117,15 @@ LoopCloser::Ways LoopCloser::WaysFrom(int keyframe) const {
   while (!open.empty()) {
     const auto [drift_m, node] = open.top();
     open.pop();
-    const auto from = static_cast<std::size_t>(node);
-    if (drift_m > ways.drift_m[from]) continue;
-    for (const Step& step : steps_[from]) {
-      const auto to = static_cast<std::size_t>(step.to);
-      if (drift_m + step.drift_m >= ways.drift_m[to]) continue;
-      ways.drift_m[to] = drift_m + step.drift_m;
-      ways.way_m[to] = ways.way_m[from] + step.way_m;
-      open.emplace(ways.drift_m[to], step.to);
+    const auto here = static_cast<std::size_t>(node);
+    if (drift_m > ways.drift_m[here]) continue;
+    for (const std::size_t e : edges_at[here]) {
+      const int other = graph_.edges[e].from + graph_.edges[e].to - node;
+      const auto there = static_cast<std::size_t>(other);
+      if (drift_m + links_[e].drift_m >= ways.drift_m[there]) continue;
+      ways.drift_m[there] = drift_m + links_[e].drift_m;
+      ways.way_m[there] = ways.way_m[here] + links_[e].way_m;
+      open.emplace(ways.drift_m[there], other);
     }
   }
   return ways;
@@ -182,9 +183,7 @@ void LoopCloser::AddSection() {
 
 /// Places on the way before and after one, in its frame.
 LocalMap LoopCloser::Around(std::size_t place, double back_m, double forth_m) const {
-  const auto pose_of = [&](std::size_t p) -> const SE3& {
-    return Poses()[static_cast<std::size_t>(places_[p].keyframe)];
-  };
+  const auto pose_of = [&](std::size_t p) -> const SE3& { return PoseOf(places_[p]); };
   const SE3 T_local_map = pose_of(place).Inverse();
   LocalMap map = {{&places_[place], SE3()}};
   const auto add = [&](std::size_t p, std::size_t neighbour, double& left_m) {
@@ -227,10 +226,9 @@ bool LoopCloser::IsTooFar(const Candidate& candidate, const LoopRecord& loop) co
   const SE3& T_map_old = PoseOf(places_[candidate.place]);
   const Eigen::Vector3d moved =
       (T_map_old * loop.check.T_old_new).Translation() - PoseOf(places_.back()).Translation();
-  const Section& section = sections_.back();
+  const Eigen::Quaterniond ground_place = sections_.back().T_ground_place.Rotation();
   const Eigen::Vector3d up =
-      PoseOf(places_[section.place]).Rotation() *
-      (section.T_ground_place.Rotation().inverse() * Eigen::Vector3d::UnitZ());
+      PoseOf(places_.back()).Rotation() * (ground_place.inverse() * Eigen::Vector3d::UnitZ());
   const double far_m = config_.search.drift_m + 0.01 * config_.looks.drift_percent * loop.way_m;
   return std::abs(up.dot(moved)) > loop.drift_m || moved.norm() > far_m;
 }
@@ -266,29 +264,23 @@ bool LoopCloser::Confirm(std::size_t loop) {
 void LoopCloser::Accept(std::size_t loop) {
   LoopRecord& record = loops_[loop];
   record.check.fate = LoopFate::kAccepted;
-  const int from = record.old_keyframe;
-  const int to = record.new_keyframe;
-  graph_.edges.push_back({from, to, record.check.T_old_new, record.check.information, true});
-  loop_of_edge_.push_back(static_cast<int>(loop));
-  steps_[static_cast<std::size_t>(from)].push_back({to, config_.search.drift_m, 0.0});
-  steps_[static_cast<std::size_t>(to)].push_back({from, config_.search.drift_m, 0.0});
+  graph_.edges.push_back({record.old_keyframe,
+                          record.new_keyframe,
+                          record.check.T_old_new,
+                          record.check.information,
+                          true});
+  links_.push_back({static_cast<int>(loop), config_.search.drift_m, 0.0});
 }
 
 /// Takes the loops that the rest of the graph contradicts out of it; false if there are none.
 bool LoopCloser::Undo(const std::vector<double>& weight) {
   bool undone = false;
   for (std::size_t e = weight.size(); e-- > 0;) {
-    if (loop_of_edge_[e] == kNoLoop || weight[e] >= kUndoneWeight) continue;
-    const PoseEdge edge = graph_.edges[e];
-    loops_[static_cast<std::size_t>(loop_of_edge_[e])].check.fate = LoopFate::kUndone;
-    graph_.edges.erase(graph_.edges.begin() + static_cast<std::ptrdiff_t>(e));
-    loop_of_edge_.erase(loop_of_edge_.begin() + static_cast<std::ptrdiff_t>(e));
-    const auto forget = [&](int from, int to) {
-      std::vector<Step>& steps = steps_[static_cast<std::size_t>(from)];
-      std::erase_if(steps, [&](const Step& step) { return step.to == to && step.way_m == 0.0; });
-    };
-    forget(edge.from, edge.to);
-    forget(edge.to, edge.from);
+    if (links_[e].loop == kOdometry || weight[e] >= kUndoneWeight) continue;
+    loops_[static_cast<std::size_t>(links_[e].loop)].check.fate = LoopFate::kUndone;
+    const auto at = static_cast<std::ptrdiff_t>(e);
+    graph_.edges.erase(graph_.edges.begin() + at);
+    links_.erase(links_.begin() + at);
     undone = true;
   }
   return undone;

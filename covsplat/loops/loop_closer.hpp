@@ -195,9 +195,9 @@ class LoopCloser {
     std::vector<double> drift_m;
     std::vector<double> way_m;
   };
-  /// One step of a way: an edge of the graph.
-  struct Step {
-    int to;
+  /// What an edge of the graph stands for.
+  struct Link {
+    int loop;  ///< which one; kOdometry for a step of the way
     double drift_m;
     double way_m;
   };
@@ -237,13 +237,12 @@ class LoopCloser {
   const LoopConfig config_;
   ThreadPool& pool_;
   PoseGraph graph_;
-  std::vector<std::vector<Step>> steps_;  ///< from each node
+  std::vector<Link> links_;  ///< [edges]
   SE3 T_odom_newest_;
   std::deque<Place> places_;  ///< oldest first; places stay where they are in memory
   std::vector<Section> sections_;
   double way_since_section_m_ = 0.0;
   std::vector<LoopRecord> loops_;
-  std::vector<int> loop_of_edge_;  ///< [edges], -1 for odometry
 };
 
 }  // namespace covsplat

@@ -4,79 +4,41 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <utility>
 
 #include <Eigen/Cholesky>
 
-#include "covsplat/registration/voxel_hash.hpp"
+#include "covsplat/registration/nearest_index.hpp"
 
 namespace covsplat {
 namespace {
 
 constexpr int kNone = -1;
 
-/// Surfels in the map, sorted into cells of the gate's size.
-class SurfelGrid {
- public:
-  SurfelGrid(std::span<const AnchoredSurfel> surfels,
-             std::span<const SE3> T_map_keyframe,
-             double cell_m)
-      : cells_per_m_(static_cast<float>(1.0 / cell_m)), cells_(surfels.size()) {
-    std::vector<int> cell_of;
-    std::vector<int> size;
-    for (const AnchoredSurfel& surfel : surfels) {
-      const SE3& pose = T_map_keyframe[static_cast<std::size_t>(surfel.keyframe)];
-      mean.push_back((pose * surfel.mean.cast<double>()).cast<float>());
-      normal.push_back((pose.Rotation() * surfel.normal.cast<double>()).cast<float>());
-      const auto fresh = static_cast<int>(size.size());
-      cell_of.push_back(cells_.FindOrInsert(CellOf(cells_per_m_ * mean.back()), fresh));
-      if (cell_of.back() == fresh) size.push_back(0);
-      ++size[static_cast<std::size_t>(cell_of.back())];
-    }
-    begin_.assign(size.size() + 1, 0);
-    std::partial_sum(size.begin(), size.end(), begin_.begin() + 1);
-    std::vector<int> next(begin_.begin(), begin_.end() - 1);
-    order_.resize(surfels.size());
-    for (std::size_t i = 0; i < surfels.size(); ++i) {
-      const auto cell = static_cast<std::size_t>(cell_of[i]);
-      order_[static_cast<std::size_t>(next[cell]++)] = static_cast<int>(i);
-    }
-  }
-
-  /// Calls visit(j) for all surfels in the cells around a position.
-  template <class Visit>
-  void Around(const Eigen::Vector3f& position, Visit&& visit) const {
-    const Eigen::Vector3i middle = CellOf(cells_per_m_ * position);
-    for (int k = 0; k < 27; ++k) {
-      const Eigen::Vector3i step(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
-      const int cell = cells_.Find(middle + step);
-      if (cell < 0) continue;
-      for (int at = begin_[static_cast<std::size_t>(cell)];
-           at < begin_[static_cast<std::size_t>(cell) + 1];
-           ++at) {
-        visit(static_cast<std::size_t>(order_[static_cast<std::size_t>(at)]));
-      }
-    }
-  }
-
+/// Surfels in the map, one by one as they were given.
+struct MapSurfels {
   std::vector<Eigen::Vector3f> mean;
   std::vector<Eigen::Vector3f> normal;
-
- private:
-  float cells_per_m_;
-  VoxelHash cells_;
-  std::vector<int> begin_;
-  std::vector<int> order_;
 };
+
+MapSurfels InMap(std::span<const AnchoredSurfel> surfels, std::span<const SE3> T_map_keyframe) {
+  MapSurfels in_map;
+  for (const AnchoredSurfel& surfel : surfels) {
+    const SE3& pose = T_map_keyframe[static_cast<std::size_t>(surfel.keyframe)];
+    in_map.mean.push_back((pose * surfel.mean.cast<double>()).cast<float>());
+    in_map.normal.push_back((pose.Rotation() * surfel.normal.cast<double>()).cast<float>());
+  }
+  return in_map;
+}
 
 /// Of each surfel the nearest one of another pass.
 std::vector<int> MatchPasses(std::span<const AnchoredSurfel> surfels,
-                             const SurfelGrid& grid,
+                             const MapSurfels& in_map,
                              std::span<const double> way_m,
                              double min_way_m,
                              const StitchConfig& config,
                              ThreadPool& pool) {
+  const NearestIndex index(in_map.mean, static_cast<float>(config.gate_m));
   const auto gate = static_cast<float>(config.gate_m * config.gate_m);
   const auto min_cosine =
       static_cast<float>(std::cos(config.max_angle_deg * std::numbers::pi / 180.0));
@@ -87,10 +49,10 @@ std::vector<int> MatchPasses(std::span<const AnchoredSurfel> surfels,
   ParallelFor(pool, surfels.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       float nearest = gate;
-      grid.Around(grid.mean[i], [&](std::size_t j) {
-        const float square = (grid.mean[j] - grid.mean[i]).squaredNorm();
+      index.ForEachAround(in_map.mean[i], [&](std::size_t j) {
+        const float square = (in_map.mean[j] - in_map.mean[i]).squaredNorm();
         if (square >= nearest || std::abs(way_of(i) - way_of(j)) < min_way_m) return;
-        if (grid.normal[j].dot(grid.normal[i]) < min_cosine) return;
+        if (in_map.normal[j].dot(in_map.normal[i]) < min_cosine) return;
         nearest = square;
         match[i] = static_cast<int>(j);
       });
@@ -134,8 +96,8 @@ std::vector<PoseEdge> StitchEdges(std::span<const AnchoredSurfel> surfels,
                                   double min_way_m,
                                   const StitchConfig& config,
                                   ThreadPool& pool) {
-  const SurfelGrid grid(surfels, T_map_keyframe, config.gate_m);
-  const std::vector<int> match = MatchPasses(surfels, grid, way_m, min_way_m, config, pool);
+  const MapSurfels in_map = InMap(surfels, T_map_keyframe);
+  const std::vector<int> match = MatchPasses(surfels, in_map, way_m, min_way_m, config, pool);
   const auto T_between = [&](int from, int to) {
     return T_map_keyframe[static_cast<std::size_t>(from)].Inverse() *
            T_map_keyframe[static_cast<std::size_t>(to)];

@@ -40,6 +40,21 @@ class NearestIndex {
                 int hint = -1,
                 float margin_m = 0.0f) const;
 
+  /// Calls visit(i) with the original index of every point in the cells around a position: all that
+  /// are nearer than a cell's edge are among them.
+  template <class Visit>
+  void ForEachAround(const Eigen::Vector3f& position, Visit&& visit) const {
+    const Eigen::Vector3i home = CellOf(position * cells_per_m_);
+    for (int k = 0; k < 27; ++k) {
+      const int cell = cells_.Find(home + Eigen::Vector3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
+      if (cell < 0) continue;
+      const int end = begin_[static_cast<std::size_t>(cell) + 1];
+      for (int slot = begin_[static_cast<std::size_t>(cell)]; slot < end; ++slot) {
+        visit(static_cast<std::size_t>(IndexOf(slot)));
+      }
+    }
+  }
+
  private:
   // The two nearest points so far.
   struct Search {

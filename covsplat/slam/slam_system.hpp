@@ -15,7 +15,7 @@ namespace covsplat {
 struct ScanRecord {
   std::int64_t scan = 0;
   double stamp_s = 0.0;  ///< mid scan: the time of the pose
-  SE3 T_map_sensor;      ///< as known then; SlamSystem::Path() has what loops made of it
+  SE3 T_map_sensor;      ///< as known then; SlamSystem::PoseOf has what loops made of it
   TrackState state = TrackState::kInitializing;
   bool is_keyframe = false;
   std::size_t points = 0;

@@ -83,6 +83,24 @@ TEST_F(LoopCloserTest, WithoutDriftNothingMoves) {
   }
 }
 
+TEST_F(LoopCloserTest, WhatHasDriftedTooFarForItsPoseIsKnownByItsLooks) {
+  LoopConfig config;
+  config.search.drift_m = 0.2;
+  config.search.drift_percent = 0.05;
+  config.search.reach_m = 0.1;
+  LoopCloser closer(config, pool_);
+  Drive(closer, kLap + 30, Drift(2e-4, 0.0));
+  int by_looks = 0;
+  for (const LoopRecord& loop : closer.Loops()) {
+    if (loop.check.fate != LoopFate::kAccepted) continue;
+    by_looks += loop.hint == LoopHint::kLooks ? 1 : 0;
+    const SE3 truth = RoundTheBlock(kStepM * loop.old_keyframe).Inverse() *
+                      RoundTheBlock(kStepM * loop.new_keyframe);
+    EXPECT_LT(TranslationError(loop.check.T_old_new, truth), 0.05);
+  }
+  EXPECT_GE(by_looks, 2);
+}
+
 TEST_F(LoopCloserTest, NoLoopIsFarFromWhatOdometryAllows) {
   LoopConfig config;
   config.search.drift_percent = 0.01;
