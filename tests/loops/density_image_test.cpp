@@ -104,7 +104,8 @@ TEST(DensityImage, APlaceIsKnownAgainFromTheOtherDirection) {
   const RayScene city = BlockCity();
   const SE3 T_map_old = RoundTheBlock(30.0);
   const SE3 T_map_fresh =
-      RoundTheBlock(35.0) * MakePose(0.05, -0.03, M_PI, 0.0, 0.0, 0.0);  // tilted, and turned round
+      RoundTheBlock(35.0) *
+      MakePose(0.05, -0.03, M_PI, 0.0, 3.0, 0.0);  // tilted, turned round, aside
   const auto old = Stretch(city, 5.0, 60.0, 0.0, T_map_old, 100);
   const auto fresh = Stretch(city, 10.0, 55.0, M_PI, T_map_fresh, 200);
   const auto landmarks_of = [](std::vector<Eigen::Vector3f> points, const SE3& T_ground_local) {
