@@ -72,7 +72,7 @@ std::string TrajectoryPlot(const ReportData& data,
     if (marks.Size() > 0) curves.push_back(std::move(marks));
   };
   mark(data.keyframes, "keyframes", kKeyframe);
-  mark(data.loops_rejected, "looked at, no loop", kRejected);
+  mark(data.loops_rejected, "no loop", kRejected);
   mark(data.loops_closed, "loops", kClosed);
   return PlotSvg(options, curves);
 }
