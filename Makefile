@@ -1,6 +1,6 @@
 # The short way to everything; CMake presets do the work.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test cuda bench bench-peers bench-ablation bench-growth oracles check-map format tidy docs clean
+.PHONY: help setup demo test cuda bench bench-peers bench-ablation bench-growth bench-loops bench-loop-seeds oracles check-map format tidy docs clean
 
 COVSPLAT_DATA ?= ../shared/data
 THREADS ?= 2
@@ -47,6 +47,8 @@ bench: setup build-release  ## Run the benchmarks
 
 SENSOR_courtyard = --sensor os1-64 --motion walking
 SENSOR_college = --sensor os1-64 --motion walking
+SENSOR_multilevel = --sensor os1-64 --motion walking
+SENSOR_tunnel = --sensor os1-64 --motion walking
 SENSOR_street = --sensor hdl-64e --motion vehicle
 
 simulate-%: build-release
@@ -70,6 +72,16 @@ bench_out/street-laps/gt_tum.txt: | build-release
 bench-growth: setup build-release .venv/peers bench_out/street-laps/gt_tum.txt  ## Four times round the streets: docs/benchmarks.md
 	PYTHONPATH=bench/peers .venv/bin/python bench/growth/run.py --covsplat build/release/apps/covsplat \
 	  --recording bench_out/street-laps --out bench_out/growth --update docs/benchmarks.md
+
+LOOP_WORLDS = street college multilevel tunnel
+bench-loops: setup build-release .venv/peers $(addprefix simulate-,$(LOOP_WORLDS))  ## What closing loops gains: docs/benchmarks.md
+	PYTHONPATH=bench/peers .venv/bin/python bench/loops/run.py --covsplat build/release/apps/covsplat \
+	  $(LOOP_WORLDS:%=--recording bench_out/%) --no-map tunnel --data $(COVSPLAT_DATA) --threads $(THREADS) \
+	  --out bench_out/loops $(if $(ONLY),--only '$(ONLY)',--update docs/benchmarks.md)
+
+bench-loop-seeds: setup build-release .venv/peers  ## Loops in 20 worlds of a kind: docs/benchmarks.md
+	PYTHONPATH=bench/peers .venv/bin/python bench/loops/seeds.py --covsplat build/release/apps/covsplat \
+	  --out bench_out/loop_seeds --update docs/benchmarks.md
 
 .venv/oracles: tools/oracles/requirements.txt
 	@tools/setup.sh --with-python

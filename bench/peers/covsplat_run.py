@@ -15,6 +15,16 @@ from se3 import Trajectory
 TRACKING = ("preprocess", "align", "deskew")
 
 
+def base_command(binary: Path, recording: Recording, out: Path, threads: int) -> list[str]:
+    """Of a run, with what the recording needs."""
+    command = [str(binary), "run", str(recording.folder), "-o", str(out), "--overwrite"]
+    command += ["--threads", str(threads)]
+    if recording.azimuth_period_s is not None:
+        command += ["-s", "deskew.time_source=azimuth"]
+        command += ["-s", f"deskew.scan_period_s={recording.azimuth_period_s}"]
+    return command
+
+
 def run_covsplat(
     binary: Path, recording: Recording, out: Path, threads: int, *, mapping: bool
 ) -> Outcome:
@@ -23,11 +33,7 @@ def run_covsplat(
     The times per scan are the tracker's ("scan in to pose out"). CPU time and peak memory are the
     process's, with reading, mapping and writing: upper bounds next to the peers'.
     """
-    command = [str(binary), "run", str(recording.folder), "-o", str(out), "--overwrite"]
-    command += ["--threads", str(threads)]
-    if recording.azimuth_period_s is not None:
-        command += ["-s", "deskew.time_source=azimuth"]
-        command += ["-s", f"deskew.scan_period_s={recording.azimuth_period_s}"]
+    command = base_command(binary, recording, out, threads)
     if not mapping:
         command += ["-s", "mapping.feedback.mode=frozen"]
     done = run_program(command)
@@ -106,13 +112,19 @@ def score_mesh(
     taus_m: tuple[float, ...],
     threads: int,
     trajectory: Path | None,
+    voxel_m: float | None = None,
 ) -> MeshScore:
-    """`trajectory`: that the mesh was made with, if not the truth; aligns it with the truth."""
+    """`trajectory`: that the mesh was made with, if not the truth; aligns it with the truth.
+
+    `voxel_m`: of the comparison, if not the program's default.
+    """
     command = [str(binary), "eval", "map", str(mesh), str(recording.true_mesh)]
     command += ["--recording", str(recording.folder), "--threads", str(threads)]
     command += ["--tau", ",".join(str(tau_m) for tau_m in taus_m), "--json", "--quiet"]
     if trajectory is not None:
         command += ["--trajectory", str(trajectory)]
+    if voxel_m is not None:
+        command += ["--voxel", str(voxel_m)]
     found = json.loads(run_program(command).stdout)
     return MeshScore(
         found["result"]["triangles"],

@@ -92,6 +92,26 @@ class Recording:
         return Trajectory.from_matrices(self.stamps_s, poses)
 
 
+def azimuth_periods(texts: list[str]) -> dict[str, float]:
+    """Of NAME=SECONDS: the turn of each recording whose points' times follow from their azimuth."""
+    periods = {}
+    for text in texts:
+        name, separator, seconds = text.partition("=")
+        if not separator:
+            raise SystemExit(f"--azimuth-time {text}: expected NAME=SECONDS")
+        periods[name] = float(seconds)
+    return periods
+
+
+def marked(data: Path | None, mark: str) -> list[Path]:
+    """The recordings that INDEX.md marks so; none if there is no such folder."""
+    if data is None or not (data / "INDEX.md").is_file():
+        return []
+    columns = (line.split("|") for line in (data / "INDEX.md").read_text().splitlines())
+    names = [row[1].strip(" `") for row in columns if len(row) > 2 and mark in row[2]]
+    return [data / name for name in names if (data / name / "velodyne").is_dir()]
+
+
 def deskewed(scan: Scan, trajectory: Trajectory) -> Array:
     """The points in the sensor's frame at the middle of the scan, moved with the trajectory."""
     if scan.offsets_s is None:

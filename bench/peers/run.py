@@ -20,15 +20,15 @@ import plots
 import report
 import stages
 import track_runs
-from recording import Recording
+from recording import Recording, azimuth_periods, marked
 
 
 def main() -> int:
     options = parse(sys.argv[1:])
     load_before = os.getloadavg()
-    periods = dict(split_period(text) for text in options.azimuth_time)
+    periods = azimuth_periods(options.azimuth_time)
     results = page.Results()
-    for folder in options.recording + tracked(options.data):
+    for folder in options.recording + marked(options.data, "*track*"):
         recording = Recording.open(folder, periods.get(folder.resolve().name))
         compare(recording, options, results)
     about = page.circumstances("python3 " + shlex.join(sys.argv), load_before)
@@ -66,22 +66,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         help="recording whose points' times follow from the azimuth of a clockwise turn so long",
     )
     return parser.parse_args(arguments)
-
-
-def split_period(text: str) -> tuple[str, float]:
-    name, separator, seconds = text.partition("=")
-    if not separator:
-        raise SystemExit(f"--azimuth-time {text}: expected NAME=SECONDS")
-    return name, float(seconds)
-
-
-def tracked(data: Path | None) -> list[Path]:
-    """The recordings that INDEX.md marks; none if there is no such folder."""
-    if data is None or not (data / "INDEX.md").is_file():
-        return []
-    columns = (line.split("|") for line in (data / "INDEX.md").read_text().splitlines())
-    names = [row[1].strip(" `") for row in columns if len(row) > 2 and "*track*" in row[2]]
-    return [data / name for name in names if (data / name / "velodyne").is_dir()]
 
 
 def compare(recording: Recording, options: argparse.Namespace, results: page.Results) -> None:

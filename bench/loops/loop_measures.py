@@ -1,0 +1,149 @@
+"""What loops were worth: which were wrong, which were missed, and whether walls are double."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from recording import Recording
+from se3 import Array, Trajectory, rotations_of
+
+# A loop that is farther off is one of another place.
+WRONG_M = 0.5
+WRONG_DEG = 3.0
+# A revisit: on the same level, this near to a way that was gone long before.
+NEAR_M = 10.0
+LEVEL_M = 1.0
+LONG_BEFORE_M = 30.0
+SHORTEST_M = 5.0
+
+
+@dataclass(frozen=True)
+class Loop:
+    old: int
+    new: int
+    T_old_new: Array
+
+
+@dataclass(frozen=True)
+class LoopFacts:
+    looked_at: int
+    accepted: int
+    wrong: int | None = None  # these need the truth
+    worst_m: float | None = None
+    revisits: int | None = None
+    found: int | None = None
+
+
+def loop_facts(run: Path, recording: Recording) -> LoopFacts:
+    with (run / "loops.csv").open(newline="") as lines:
+        looked_at = len(list(csv.DictReader(lines)))
+    loops = read_loops(run / "pose_graph.g2o")
+    if not recording.is_simulated:
+        return LoopFacts(looked_at, len(loops))
+    keyframes = Trajectory.read_tum(run / "keyframes_tum.txt")
+    truth = recording.truth().at(keyframes.times_s).matrices()
+    errors = [np.linalg.inv(T_between(truth, loop)) @ loop.T_old_new for loop in loops]
+    errors_m = [float(np.linalg.norm(error[:3, 3])) for error in errors]
+    wrong = sum(is_wrong(error) for error in errors)
+    revisits = revisits_of(truth)
+    found = [any(loop.new in revisit for loop in loops) for revisit in revisits]
+    return LoopFacts(
+        looked_at, len(loops), wrong, max(errors_m, default=None), len(revisits), sum(found)
+    )
+
+
+def read_loops(g2o: Path) -> list[Loop]:
+    """The edges that are no steps from one keyframe to the next."""
+    loops = []
+    for line in g2o.read_text().splitlines():
+        words = line.split()
+        if not words or words[0] != "EDGE_SE3:QUAT" or int(words[2]) == int(words[1]) + 1:
+            continue
+        x, y, z, qx, qy, qz, qw = map(float, words[3:10])
+        pose = np.eye(4)
+        pose[:3, :3] = rotations_of(np.array([[qw, qx, qy, qz]]))[0]
+        pose[:3, 3] = x, y, z
+        loops.append(Loop(int(words[1]), int(words[2]), pose))
+    return loops
+
+
+def T_between(poses: Array, loop: Loop) -> Array:
+    return np.linalg.inv(poses[loop.old]) @ poses[loop.new]
+
+
+def is_wrong(error: Array) -> bool:
+    cosine = np.clip((np.trace(error[:3, :3]) - 1) / 2, -1.0, 1.0)
+    return bool(
+        np.linalg.norm(error[:3, 3]) > WRONG_M or np.degrees(np.arccos(cosine)) > WRONG_DEG
+    )
+
+
+def ways_along(positions: Array) -> Array:
+    steps_m = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps_m)])
+
+
+def revisits_of(truth: Array) -> list[range]:
+    """Stretches of keyframes that go where the way had been long before."""
+    positions = truth[:, :3, 3]
+    way_m = ways_along(positions)
+    again = [any_near(positions, way_m, k) for k in range(len(positions))]
+    revisits, begin = [], None
+    for k, is_again in enumerate([*again, False]):
+        if is_again and begin is None:
+            begin = k
+        if not is_again and begin is not None:
+            if way_m[k - 1] - way_m[begin] >= SHORTEST_M:
+                revisits.append(range(begin, k))
+            begin = None
+    return revisits
+
+
+def any_near(positions: Array, way_m: Array, k: int) -> bool:
+    before = positions[way_m < way_m[k] - LONG_BEFORE_M] - positions[k]
+    near = (np.linalg.norm(before[:, :2], axis=1) < NEAR_M) & (np.abs(before[:, 2]) < LEVEL_M)
+    return bool(near.any())
+
+
+def thickness_m(run: Path) -> Array:
+    """Distances between surfaces that two passes have left of the same wall."""
+    reach_m, max_angle_deg, min_opacity = 0.4, 20.0, 0.5
+    positions, normals, keyframe, opacity = read_surfels(run / "map.ply")
+    passes_m = ways_along(Trajectory.read_tum(run / "keyframes_tum.txt").positions)[keyframe]
+    kept = (opacity > min_opacity) & np.isfinite(positions).all(1)
+    positions, normals, passes_m = positions[kept], normals[kept], passes_m[kept]
+    found = []
+    for i, near in enumerate(cKDTree(positions).query_ball_point(positions, reach_m)):
+        others = np.array(near)
+        others = others[np.abs(passes_m[others] - passes_m[i]) > LONG_BEFORE_M]
+        others = others[normals[others] @ normals[i] > np.cos(np.radians(max_angle_deg))]
+        if not len(others):
+            continue
+        apart = positions[others] - positions[i]
+        nearest = np.linalg.norm(apart, axis=1).argmin()
+        found.append(abs(normals[others[nearest]] @ apart[nearest]))
+    return np.array(found)
+
+
+def read_surfels(ply: Path) -> tuple[Array, Array, Array, Array]:
+    raw = ply.read_bytes()
+    end = raw.index(b"end_header\n") + len(b"end_header\n")
+    words = [line.split() for line in raw[:end].decode().splitlines()]
+    names = [line[2] for line in words if line[0] == "property"]
+    count = next(int(line[2]) for line in words if line[:2] == ["element", "vertex"])
+    table = np.frombuffer(raw[end:], dtype=[(name, "<f4") for name in names], count=count)
+    quaternions = np.stack([table[f"rot_{k}"] for k in range(4)], 1).astype(float)
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    positions = np.stack([table[axis] for axis in "xyz"], 1).astype(float)
+    opacity = 1 / (1 + np.exp(-table["opacity"].astype(float)))
+    return (
+        positions,
+        rotations_of(quaternions)[:, :, 2],
+        table["keyframe"].astype(int),
+        opacity,
+    )

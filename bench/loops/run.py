@@ -1,0 +1,178 @@
+"""What closing loops gains: trajectories, loops, double walls and surfaces, beside KISS-SLAM.
+
+PYTHONPATH=bench/peers .venv/bin/python bench/loops/run.py --covsplat build/release/apps/covsplat \
+    --recording bench_out/multilevel
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+import page
+import peers
+import report
+import track_runs
+from covsplat_run import base_command, mesh_of_run, score_mesh
+from loop_measures import LoopFacts, loop_facts, thickness_m, ways_along
+from processes import apart, run_program
+from recording import Recording, azimuth_periods, marked
+from report import number
+from se3 import Trajectory
+
+HEADER = (
+    "recording",
+    "way m",
+    "method",
+    "ATE mm",
+    "% of the way",
+    "looked at",
+    "accepted",
+    "wrong",
+    "worst mm",
+    "revisits found",
+    "double walls: median mm",
+    "90 % mm",
+    "strict F 0.1 m",
+    "0.05 m",
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    recording: str
+    way_m: float
+    method: str
+    ate_m: float
+    loops: LoopFacts | None = None
+    double_mm: tuple[float, float] | None = None  # median and 90 %
+    strict_f_percent: tuple[float, float] | None = None  # at 0.1 and 0.05 m
+
+
+def main() -> int:
+    options = parse()
+    periods = azimuth_periods(options.azimuth_time)
+    rows = []
+    for folder in options.recording + marked(options.data, "*loop*"):
+        recording = Recording.open(folder, periods.get(folder.resolve().name))
+        rows += compared(recording, options)
+    page.publish(f"\n{report.table(HEADER, list(map(cells, rows)))}\n", "loops", options.update)
+    return 0
+
+
+def parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--covsplat", type=Path, required=True, help="the binary")
+    parser.add_argument("--recording", type=Path, action="append", default=[], metavar="DIR")
+    parser.add_argument("--data", type=Path, metavar="DIR", help="also what it marks *loop*")
+    parser.add_argument("--azimuth-time", action="append", default=[], metavar="NAME=SECONDS")
+    parser.add_argument("--only", type=re.compile, default=re.compile(""), metavar="REGEX")
+    parser.add_argument("--voxel", type=float, default=0.1, metavar="METRES", help="of all meshes")
+    parser.add_argument("--no-map", action="append", default=[], metavar="NAME", help="recording")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=Path("bench_out/loops"))
+    parser.add_argument("--update", type=Path, metavar="PAGE", help="write between its markers")
+    return parser.parse_args()
+
+
+def compared(recording: Recording, options: argparse.Namespace) -> list[Row]:
+    out = options.out / recording.name
+    out.mkdir(parents=True, exist_ok=True)
+    runs = {
+        "loops off": ["--loops", "off"],
+        "loops on": ["--loops", "on"],
+        "true poses": ["--loops", "off", "--poses", str(recording.folder / "gt_tum.txt")],
+    }
+    if not recording.is_simulated:
+        del runs["true poses"]
+    rows = []
+
+    def add(row: Row) -> None:
+        rows.append(row)
+        print(" | ".join(cells(row)), flush=True)
+
+    for name, flags in runs.items():
+        folder = out / name.replace(" ", "_")
+        if options.only.search(f"{recording.name}, {name}"):
+            command = base_command(options.covsplat, recording, folder, options.threads)
+            run_program([*command, "--deterministic", "--quiet", *flags])
+            add(judged(recording, name, folder, options))
+    if options.only.search(f"{recording.name}, optimize"):
+        folder = out / "optimized"
+        command = [str(options.covsplat), "optimize", str(out / "loops_on"), "-o", str(folder)]
+        run_program([*command, "--overwrite", "--quiet", "--threads", str(options.threads)])
+        add(judged(recording, "loops on, then `optimize`", folder, options))
+    if options.only.search(f"{recording.name}, KISS-SLAM"):
+        outcome = apart(partial(peers.run_kiss_slam, recording, options.threads))
+        add(row_of(recording, "KISS-SLAM", outcome.trajectory))
+    return rows
+
+
+def row_of(recording: Recording, method: str, trajectory: Trajectory) -> Row:
+    absolute_m, _ = track_runs.errors_of(trajectory, recording)
+    way_m = float(ways_along(recording.truth().positions)[-1])
+    return Row(recording.name, way_m, method, track_runs.rms(absolute_m))
+
+
+def judged(recording: Recording, method: str, run: Path, options: argparse.Namespace) -> Row:
+    row = row_of(recording, method, Trajectory.read_tum(run / "trajectory_tum.txt"))
+    closed = run / "loops" if (run / "loops").is_dir() else run
+    loops = loop_facts(closed, recording) if (closed / "loops.csv").is_file() else None
+    apart_m = thickness_m(run)
+    double = tuple(1e3 * np.percentile(apart_m, [50, 90])) if len(apart_m) else None
+    return Row(
+        row.recording, row.way_m, method, row.ate_m, loops, double, surface(recording, run, options)
+    )
+
+
+def surface(
+    recording: Recording, run: Path, options: argparse.Namespace
+) -> tuple[float, float] | None:
+    if recording.true_mesh is None or recording.name in options.no_map:
+        return None
+    mesh = run / "mesh.ply"
+    mesh_of_run(options.covsplat, run, mesh, options.voxel, options.threads)
+    score = score_mesh(
+        options.covsplat,
+        mesh,
+        recording,
+        (0.1, 0.05),
+        options.threads,
+        run / "trajectory_tum.txt",
+        voxel_m=0.05,
+    )
+    return score.strict.f_percent[0.1], score.strict.f_percent[0.05]
+
+
+def cells(row: Row) -> list[str]:
+    loops = row.loops or LoopFacts(0, 0)
+    known = row.loops is not None
+    double = row.double_mm or (None, None)
+    strict = row.strict_f_percent or (None, None)
+    has_truth = known and loops.revisits is not None
+    return [
+        row.recording,
+        number(row.way_m, 0),
+        row.method,
+        number(1e3 * row.ate_m, 1),
+        number(100 * row.ate_m / row.way_m, 4),
+        str(loops.looked_at) if known else "-",
+        str(loops.accepted) if known else "-",
+        str(loops.wrong) if has_truth else "-",
+        number(None if loops.worst_m is None else 1e3 * loops.worst_m, 1),
+        f"{loops.found}/{loops.revisits}" if has_truth else "-",
+        number(double[0], 1),
+        number(double[1], 1),
+        number(strict[0], 2),
+        number(strict[1], 2),
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
