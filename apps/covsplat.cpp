@@ -21,6 +21,7 @@ int Run(int argc, char** argv) {
   app.footer(kFooter);
   app.require_subcommand(1);
   AddRunCommand(app, exit_code);
+  AddOptimizeCommand(app, exit_code);
   AddDemoCommand(app, exit_code);
   AddSimulateCommand(app, exit_code);
   AddInfoCommand(app, exit_code);

@@ -24,7 +24,7 @@ std::string Row(const LoopRecord& loop, std::span<const std::int64_t> keyframe_s
                      loop.check.overlap,
                      loop.check.rms_m,
                      loop.check.seen_through,
-                     loop.check.moved_m,
+                     loop.moved_m,
                      NameOfEnum(loop.check.fate));
 }
 

@@ -64,7 +64,7 @@ Result<Prepared> Prepare(RunRequest& request) {
     const double period_s = request.config.input.scan_period_s;
     Result<Trajectory> poses = LoadForRecording(*request.poses, request.recording, period_s);
     if (!poses) return Forward(poses);
-    run.system->UsePoses(std::move(*poses));
+    run.system->UsePoses(std::move(*poses), request.poses_meaning);
   }
   const auto folder = MakeRunFolder(request.folder, std::time(nullptr));
   if (!folder) return Forward(folder);

@@ -23,6 +23,7 @@ struct RunRequest {
   bool quiet = false;
   std::optional<std::filesystem::path> truth;  ///< trajectory to evaluate against
   std::optional<std::filesystem::path> poses;  ///< trajectory to map with instead of tracking
+  GivenPoses poses_meaning = GivenPoses::kExact;
   std::string command_line;
 };
 

@@ -11,6 +11,9 @@ namespace covsplat {
 /// run <recording>
 void AddRunCommand(CLI::App& app, int& exit_code);
 
+/// optimize <run folder>
+void AddOptimizeCommand(CLI::App& app, int& exit_code);
+
 /// demo
 void AddDemoCommand(CLI::App& app, int& exit_code);
 

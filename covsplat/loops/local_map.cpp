@@ -35,12 +35,12 @@ std::vector<LocalPoint> Gather(const LocalMap& map, double voxel_m, bool only_fl
   for (const PosedPlace& posed : map) {
     const Eigen::Matrix3f rotation = posed.T_local_place.RotationMatrix().cast<float>();
     const Eigen::Vector3f translation = posed.T_local_place.Translation().cast<float>();
-    for (std::size_t i = 0; i < posed.place->points.size(); ++i) {
-      if (only_flat && posed.place->normals[i].isZero()) continue;
-      const Eigen::Vector3f point = rotation * posed.place->points[i] + translation;
+    for (const PlacePoint& seen : posed.place->points) {
+      if (only_flat && !seen.IsFlat()) continue;
+      const Eigen::Vector3f point = rotation * seen.Position() + translation;
       const auto fresh = static_cast<int>(points.size());
       if (taken.FindOrInsert(CellOf(point / static_cast<float>(voxel_m)), fresh) != fresh) continue;
-      points.push_back({point, rotation * posed.place->normals[i]});
+      points.push_back({point, rotation * seen.Normal()});
     }
   }
   return points;
@@ -48,20 +48,24 @@ std::vector<LocalPoint> Gather(const LocalMap& map, double voxel_m, bool only_fl
 
 }  // namespace
 
+PlacePoint::PlacePoint(const Eigen::Vector3f& position_m, const Eigen::Vector3f& normal)
+    : position_((position_m / kStepM).array().round().cast<std::int16_t>()),
+      normal_((127.0f * normal).array().round().cast<std::int8_t>()) {}
+
 Place MakePlace(int keyframe,
                 std::span<const Eigen::Vector3f> points,
                 std::span<const Eigen::Vector3f> surface,
                 std::span<const PointCovariance> covariance,
                 double voxel_m) {
-  Place place{keyframe, {}, {}, Sight(points)};
+  Place place{keyframe, {}, Sight(points)};
   VoxelHash taken(surface.size());
   for (std::size_t i = 0; i < surface.size(); ++i) {
+    if (!(surface[i].cwiseAbs().maxCoeff() <= PlacePoint::kFarthestM)) continue;
     const auto fresh = static_cast<int>(place.points.size());
     const Eigen::Vector3i cell = CellOf(surface[i] / static_cast<float>(voxel_m));
     if (taken.FindOrInsert(cell, fresh) != fresh) continue;
-    place.points.push_back(surface[i]);
     const Eigen::Vector3f normal = covariance[i].axes.col(2);
-    place.normals.push_back(IsFlat(covariance[i]) ? normal : Eigen::Vector3f::Zero());
+    place.points.emplace_back(surface[i], IsFlat(covariance[i]) ? normal : Eigen::Vector3f::Zero());
   }
   return place;
 }
@@ -100,8 +104,8 @@ double SeenThroughShare(const LocalMap& map, const LocalMap& by, const SE3& T_by
       const SE3 T_seeing_seen = seeing.T_local_place.Inverse() * T_by_map * seen.T_local_place;
       const Eigen::Matrix3f rotation = T_seeing_seen.RotationMatrix().cast<float>();
       const Eigen::Vector3f translation = T_seeing_seen.Translation().cast<float>();
-      for (const Eigen::Vector3f& point : seen.place->points) {
-        const Seen what = seeing.place->sight.See(rotation * point + translation);
+      for (const PlacePoint& point : seen.place->points) {
+        const Seen what = seeing.place->sight.See(rotation * point.Position() + translation);
         through += what == Seen::kThrough ? 1 : 0;
         there += what == Seen::kThere ? 1 : 0;
       }

@@ -1,6 +1,8 @@
 // Local maps: what a few keyframes saw, brought together to be recognised.
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "covsplat/loops/sight.hpp"
@@ -9,11 +11,29 @@
 
 namespace covsplat {
 
+/// A surface point in ten bytes: maps of long ways have many.
+class PlacePoint {
+ public:
+  static constexpr float kStepM = 0.005f;
+  static constexpr float kFarthestM = 32767.0f * kStepM;
+
+  /// No coordinate farther than `kFarthestM`.
+  PlacePoint(const Eigen::Vector3f& position_m, const Eigen::Vector3f& normal);
+
+  Eigen::Vector3f Position() const { return kStepM * position_.cast<float>(); }
+  /// Unit; zero where it is not flat.
+  Eigen::Vector3f Normal() const { return normal_.cast<float>().normalized(); }
+  bool IsFlat() const { return !normal_.isZero(); }
+
+ private:
+  Eigen::Matrix<std::int16_t, 3, 1> position_;  ///< in steps
+  Eigen::Matrix<std::int8_t, 3, 1> normal_;     ///< in steps of 1/127
+};
+
 /// What is kept of a keyframe to know its place again, in the sensor frame.
 struct Place {
   int keyframe = 0;
-  std::vector<Eigen::Vector3f> points;   ///< [N] m
-  std::vector<Eigen::Vector3f> normals;  ///< [N] unit; zero where it is not flat
+  std::vector<PlacePoint> points;
   Sight sight;
 };
 

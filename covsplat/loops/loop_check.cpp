@@ -70,19 +70,10 @@ AlignResult AlignFromAround(const SourceCloud& source,
   return best;
 }
 
-Eigen::Matrix3d WithoutDirections(const std::vector<Eigen::Vector3d>& directions) {
-  Eigen::Matrix3d projection = Eigen::Matrix3d::Identity();
-  for (const Eigen::Vector3d& d : directions) projection -= d * d.transpose();
-  return projection;
-}
-
 /// That of the registration less what it does not hold, and no more than the configured deviations
 /// allow: (I^-1 + S)^-1, which is written so that I need not have an inverse.
 Matrix6d InformationOf(const AlignResult& align, const LoopCheckConfig& config) {
-  Matrix6d held = Matrix6d::Zero();
-  held.topLeftCorner<3, 3>() = WithoutDirections(align.weak_rotations);
-  held.bottomRightCorner<3, 3>() = WithoutDirections(align.weak_translations);
-  const Matrix6d measured = held * align.information * held;
+  const Matrix6d measured = WithoutDirections(align.information, align.weak);
   const double rad = std::max(config.sigma_deg * kDegree, 1e-6);
   const double m = std::max(config.sigma_m, 1e-6);
   Vector6d most;
@@ -113,7 +104,6 @@ LoopCheck CheckLoop(const LocalMap& fresh,
   const AlignResult align = AlignFromAround(source, target, T_old_new_guess, reach_m, config, pool);
   LoopCheck check;
   check.T_old_new = align.motion.T_map_sensor;
-  check.moved_m = (check.T_old_new.Translation() - T_old_new_guess.Translation()).norm();
   if (align.correspondences == 0) return check;
   check.information = InformationOf(align, config);
   check.overlap = align.inlier_ratio;

@@ -81,7 +81,6 @@ struct LoopCheck {
   double overlap = 0.0;
   double rms_m = 0.0;
   double seen_through = 0.0;  ///< the larger share of the two
-  double moved_m = 0.0;       ///< from the guess; in a LoopRecord from where odometry has it
 };
 
 /// Registers the new local map to the old one, from a guess that may be off by `reach_m`, more and

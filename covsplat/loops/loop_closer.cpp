@@ -8,7 +8,7 @@
 #include <span>
 #include <utility>
 
-#include <Eigen/LU>
+#include <Eigen/Cholesky>
 
 #include "covsplat/loops/ground.hpp"
 
@@ -24,31 +24,6 @@ constexpr double kUndoneWeight = 0.1;
 constexpr int kOdometry = -1;
 
 double AngleOf(const SE3& pose) { return pose.Log().head<3>().norm(); }
-
-Eigen::Matrix3d Covariance(double sigma,
-                           const std::vector<Eigen::Vector3d>& weak,
-                           double weak_sigma) {
-  Eigen::Matrix3d covariance = sigma * sigma * Eigen::Matrix3d::Identity();
-  for (const Eigen::Vector3d& d : weak) covariance += weak_sigma * weak_sigma * d * d.transpose();
-  return covariance;
-}
-
-/// Errors of odometry add up at random: their variance grows with the way.
-Matrix6d OdometryInformation(double way_m,
-                             const LoopKeyframe& keyframe,
-                             const OdometryNoiseConfig& noise) {
-  constexpr double kLeastWayM = 0.1;
-  const double root = std::sqrt(std::max(way_m, kLeastWayM));
-  Matrix6d information = Matrix6d::Zero();
-  information.topLeftCorner<3, 3>() = Covariance(noise.sigma_deg * kDegree * root,
-                                                 keyframe.weak_rotations,
-                                                 noise.weak_sigma_deg * kDegree * root)
-                                          .inverse();
-  information.bottomRightCorner<3, 3>() =
-      Covariance(noise.sigma_m * root, keyframe.weak_translations, noise.weak_sigma_m * root)
-          .inverse();
-  return information;
-}
 
 }  // namespace
 
@@ -80,19 +55,21 @@ bool LoopCloser::Look(const std::optional<Candidate>& candidate, const Ways& way
 void LoopCloser::AddNode(const LoopKeyframe& keyframe) {
   if (graph_.T_map_node.empty()) {
     graph_.T_map_node.push_back(keyframe.T_odom_keyframe);
-    T_odom_newest_ = keyframe.T_odom_keyframe;
+    odometry_.Append(keyframe.T_odom_keyframe, Matrix6d::Zero());
     return;
   }
   const int from = static_cast<int>(graph_.T_map_node.size()) - 1;
-  const SE3 T_from_to = T_odom_newest_.Inverse() * keyframe.T_odom_keyframe;
+  const SE3 T_from_to = odometry_.PoseOf(from).Inverse() * keyframe.T_odom_keyframe;
   const double way_m = T_from_to.Translation().norm();
-  const bool weak = !keyframe.weak_rotations.empty() || !keyframe.weak_translations.empty();
-  const double percent = weak ? config_.search.weak_drift_percent : config_.search.drift_percent;
+  const double percent = keyframe.knowledge.is_degenerate ? config_.search.weak_drift_percent
+                                                          : config_.search.drift_percent;
+  const Matrix6d covariance =
+      StepCovariance(keyframe.knowledge.information, way_m, config_.odometry);
+  odometry_.Append(keyframe.T_odom_keyframe, covariance);
   graph_.T_map_node.push_back(Poses().back() * T_from_to);
   graph_.edges.push_back(
-      {from, from + 1, T_from_to, OdometryInformation(way_m, keyframe, config_.odometry)});
+      {from, from + 1, T_from_to, covariance.ldlt().solve(Matrix6d::Identity())});
   links_.push_back({kOdometry, 0.01 * percent * way_m, way_m});
-  T_odom_newest_ = keyframe.T_odom_keyframe;
 }
 
 bool LoopCloser::IsPlace(const SE3& T_map_keyframe) const {
@@ -212,7 +189,7 @@ LoopRecord LoopCloser::Check(const Candidate& candidate, const Ways& ways) const
                          config_.check,
                          pool_);
   const SE3 T_old_new = PoseOf(old).Inverse() * PoseOf(places_.back());
-  loop.check.moved_m = (loop.check.T_old_new.Translation() - T_old_new.Translation()).norm();
+  loop.moved_m = (loop.check.T_old_new.Translation() - T_old_new.Translation()).norm();
   if (loop.check.fate == LoopFate::kAlone && IsTooFar(candidate, loop)) {
     loop.check.fate = LoopFate::kTooFar;
   }
@@ -222,7 +199,7 @@ LoopRecord LoopCloser::Check(const Candidate& candidate, const Ways& ways) const
 /// Whether odometry would have to have drifted more than it can. Floors of a building look alike:
 /// the height may be off by no more than that of a place found by its pose.
 bool LoopCloser::IsTooFar(const Candidate& candidate, const LoopRecord& loop) const {
-  if (candidate.hint == LoopHint::kPose) return loop.check.moved_m > loop.drift_m;
+  if (candidate.hint == LoopHint::kPose) return loop.moved_m > loop.drift_m;
   const SE3& T_map_old = PoseOf(places_[candidate.place]);
   const Eigen::Vector3d moved =
       (T_map_old * loop.check.T_old_new).Translation() - PoseOf(places_.back()).Translation();
@@ -286,11 +263,31 @@ bool LoopCloser::Undo(const std::vector<double>& weight) {
   return undone;
 }
 
-/// Poses by all loops that agree; true if any pose changed.
+PoseGraph LoopCloser::GraphWith(double odometry_scale, bool loops_are_doubtful) const {
+  PoseGraph graph = graph_;
+  for (std::size_t e = 0; e < links_.size(); ++e) {
+    const bool is_loop = links_[e].loop != kOdometry;
+    graph.edges[e].doubtful = is_loop && loops_are_doubtful;
+    if (!is_loop) graph.edges[e].information /= odometry_scale;
+  }
+  return graph;
+}
+
+PoseGraph LoopCloser::Graph() const {
+  std::vector<PoseEdge> loops;
+  for (std::size_t e = 0; e < links_.size(); ++e) {
+    if (links_[e].loop != kOdometry) loops.push_back(graph_.edges[e]);
+  }
+  return GraphWith(odometry_.ScaleBy(loops, MaxScale()), false);
+}
+
+/// Poses by all loops that agree; true if any pose changed. What contradicts the others is found
+/// out with odometry that may have drifted a lot; what is left says how much it has.
 bool LoopCloser::Solve() {
   constexpr double kNoChange = 1e-4;  // rad and m
-  PoseGraphSolution solution = Optimize(graph_, config_.graph);
-  while (Undo(solution.weight)) solution = Optimize(graph_, config_.graph);
+  while (Undo(Optimize(GraphWith(MaxScale(), true), config_.graph).weight)) {
+  }
+  PoseGraphSolution solution = Optimize(Graph(), config_.graph);
   double change = 0.0;
   for (std::size_t k = 0; k < Poses().size(); ++k) {
     const Vector6d moved = (Poses()[k].Inverse() * solution.T_map_node[k]).Log();

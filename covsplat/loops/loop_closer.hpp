@@ -8,7 +8,9 @@
 
 #include "covsplat/loops/density_image.hpp"
 #include "covsplat/loops/loop_check.hpp"
+#include "covsplat/loops/odometry_noise.hpp"
 #include "covsplat/loops/pose_graph.hpp"
+#include "covsplat/registration/degeneracy.hpp"
 
 namespace covsplat {
 
@@ -108,25 +110,6 @@ struct LoopLooksConfig {
   }
 };
 
-/// How sure the way from one keyframe to the next is.
-struct OdometryNoiseConfig {
-  double sigma_m = 0.01;
-  double sigma_deg = 0.05;
-  double weak_sigma_m = 0.1;
-  double weak_sigma_deg = 0.3;
-
-  template <class Self, class V>
-  static void Visit(Self& c, V&& v) {
-    v.Field("sigma_m", c.sigma_m, Range{1e-6, 10.0}, "standard deviation of the way after 1 m");
-    v.Field("sigma_deg", c.sigma_deg, Range{1e-6, 90.0}, "... of the turn after 1 m");
-    v.Field("weak_sigma_m",
-            c.weak_sigma_m,
-            Range{1e-6, 100.0},
-            "... in directions that surfaces do not hold");
-    v.Field("weak_sigma_deg", c.weak_sigma_deg, Range{1e-6, 180.0}, "... and of such turns");
-  }
-};
-
 struct LoopConfig {
   LoopSearchConfig search;
   LoopLooksConfig looks;
@@ -147,9 +130,7 @@ struct LoopConfig {
 /// What the closer is told of a keyframe. They come in order, none is left out.
 struct LoopKeyframe {
   SE3 T_odom_keyframe;  ///< by tracking alone: earlier keyframes never move in this frame
-  /// Unit directions, sensor frame, that the surfaces did not hold on the way here.
-  std::vector<Eigen::Vector3d> weak_rotations = {};
-  std::vector<Eigen::Vector3d> weak_translations = {};
+  PoseKnowledge knowledge = {};
   Place place;
 };
 
@@ -172,6 +153,7 @@ struct LoopRecord {
   int new_keyframe = 0;
   double way_m = 0.0;    ///< between them along the graph
   double drift_m = 0.0;  ///< that is possible on it
+  double moved_m = 0.0;  ///< from where the graph had it
   LoopCheck check;
 };
 
@@ -183,11 +165,14 @@ class LoopCloser {
   /// Takes the next keyframe in and looks for a loop; true if poses of earlier keyframes changed.
   bool Add(LoopKeyframe keyframe);
 
-  const PoseGraph& Graph() const { return graph_; }
+  /// All loops that were accepted, beyond doubt, and odometry as sure as they say it is.
+  PoseGraph Graph() const;
   const std::vector<SE3>& Poses() const { return graph_.T_map_node; }
   const std::vector<LoopRecord>& Loops() const { return loops_; }
   /// Whether any was accepted.
-  bool HasLoops() const { return graph_.edges.size() + 1 > graph_.T_map_node.size(); }
+  bool HasLoops() const {
+    return graph_.edges.size() >= graph_.T_map_node.size() && !Poses().empty();
+  }
 
  private:
   /// What lies between a keyframe and all others, by the way that drifts least.
@@ -232,13 +217,15 @@ class LoopCloser {
   bool Confirm(std::size_t loop);
   void Accept(std::size_t loop);
   bool Undo(const std::vector<double>& weight);
+  double MaxScale() const { return config_.odometry.max_factor * config_.odometry.max_factor; }
+  PoseGraph GraphWith(double odometry_scale, bool loops_are_doubtful) const;
   bool Solve();
 
   const LoopConfig config_;
   ThreadPool& pool_;
-  PoseGraph graph_;
+  PoseGraph graph_;          ///< odometry as sure as it can be
   std::vector<Link> links_;  ///< [edges]
-  SE3 T_odom_newest_;
+  OdometryChain odometry_;
   std::deque<Place> places_;  ///< oldest first; places stay where they are in memory
   std::vector<Section> sections_;
   double way_since_section_m_ = 0.0;

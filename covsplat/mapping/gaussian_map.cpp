@@ -30,7 +30,15 @@ void GaussianMap::Append(int keyframe, const SpawnedGaussians& fresh) {
 
 void GaussianMap::MarkSeen(int keyframe_number,
                            const Keyframe& keyframe,
-                           const SensorModel& sensor) {
+                           const SensorModel& sensor,
+                           int max_age) {
+  constexpr double kLiesAsItDid = 0.95;
+  constexpr float kSameSurfaceM = 0.1f;
+  const int oldest_known = keyframe_number - max_age;
+  std::vector<std::size_t> there;
+  std::vector<std::size_t> through;
+  std::size_t old_there = 0;
+  const auto is_old = [&](std::size_t i) { return signals_[i].last_seen < oldest_known; };
   const GaussianColumns<float>& table = engine_->Gaussians();
   const SE3 T_sensor_map = keyframe.PoseInMap().Inverse();
   for (const AnchorRange& range : engine_->Ranges()) {
@@ -43,12 +51,25 @@ void GaussianMap::MarkSeen(int keyframe_number,
       const std::optional<Pixel> pixel = sensor.Project(p);
       if (!pixel) continue;
       if (Sees(keyframe.measurement.range_m, *pixel, p.norm())) {
-        signals_[i].last_seen = keyframe_number;
-        signals_[i].seen_through = 0;
+        const bool lies_on_it =
+            !is_old(i) || LiesOnSurface(keyframe.measurement, sensor, *pixel, p, kSameSurfaceM);
+        if (!lies_on_it) continue;
+        there.push_back(i);
+        old_there += range.anchor < oldest_known ? 1 : 0;
       } else if (SeesThrough(keyframe.measurement.range_m, *pixel, p.norm())) {
-        ++signals_[i].seen_through;
+        through.push_back(i);
       }
     }
+  }
+  const auto old_through = static_cast<double>(std::ranges::count_if(through, is_old));
+  const auto of_old = static_cast<double>(old_there) + old_through;
+  const bool map_lies_as_it_did = static_cast<double>(old_there) >= kLiesAsItDid * of_old;
+  for (const std::size_t i : through) {
+    if (map_lies_as_it_did || !is_old(i)) ++signals_[i].seen_through;
+  }
+  for (const std::size_t i : there) {
+    signals_[i].last_seen = keyframe_number;
+    signals_[i].seen_through = 0;
   }
 }
 

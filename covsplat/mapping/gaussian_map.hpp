@@ -27,8 +27,15 @@ class GaussianMap {
   void Append(int keyframe, const SpawnedGaussians& fresh);
 
   /// Updates `last_seen` of all Gaussians that a keyframe's range image shows where they are, and
-  /// `seen_through` of those where it shows something beyond.
-  void MarkSeen(int keyframe_number, const Keyframe& keyframe, const SensorModel& sensor);
+  /// `seen_through` of those where it shows something beyond. After a long way the map may lie
+  /// elsewhere than the keyframe: Gaussians that `max_age` keyframes have not seen are seen again
+  /// only where they lie on the surface that is measured, or tracking would be torn between them
+  /// and newer ones, and count as seen through only if nearly all of the map that is so old is
+  /// where it was.
+  void MarkSeen(int keyframe_number,
+                const Keyframe& keyframe,
+                const SensorModel& sensor,
+                int max_age);
 
   /// Removes Gaussians below an opacity (or no longer finite); returns how many went.
   std::size_t PruneOpacity(double min_opacity);

@@ -86,6 +86,18 @@ bool Sees(const Image<float>& measured_m, Pixel pixel, float range_m) {
   return measured > 0.0f && std::abs(measured - range_m) < tolerance_m;
 }
 
+bool LiesOnSurface(const RangeMeasurement& measurement,
+                   const SensorModel& sensor,
+                   Pixel pixel,
+                   const Eigen::Vector3f& point,
+                   float distance_m) {
+  const float range_m = measurement.range_m(pixel.row, pixel.column);
+  const Eigen::Vector3f& normal = measurement.normal(pixel.row, pixel.column);
+  if (!(range_m > 0.0f) || normal.isZero()) return false;
+  const Eigen::Vector3f surface = range_m * sensor.RayOf(pixel.row, pixel.column);
+  return std::abs(normal.dot(point - surface)) < distance_m;
+}
+
 bool SeesThrough(const Image<float>& measured_m, Pixel pixel, float range_m) {
   const float beyond_m = kBeyondM + (1.0f + kBeyondRatio) * range_m;
   const int last_row = std::min(pixel.row + 1, measured_m.Rows() - 1);

@@ -9,6 +9,7 @@
 #include "covsplat/core/config_field.hpp"
 #include "covsplat/core/range_image.hpp"
 #include "covsplat/mapping/patches.hpp"
+#include "covsplat/registration/degeneracy.hpp"
 #include "covsplat/registration/preprocess.hpp"
 #include "covsplat/splat/engine.hpp"
 
@@ -34,8 +35,7 @@ struct TrackedScan {
   std::vector<PointCovariance> covariance;  ///< [S] the surface around each
   std::vector<float> squared_distance;      ///< [S] m^2 to the target, infinity where unmatched
   std::vector<SweptScan> sweep;             ///< of a keyframe: the scans since the one before
-  std::vector<Eigen::Vector3d> weak_rotations;     ///< unit axes that the surfaces do not hold
-  std::vector<Eigen::Vector3d> weak_translations;  ///< ... and directions
+  PoseKnowledge knowledge;                  ///< of its pose
 };
 
 /// A tracked scan on the sensor's image grid, with the surface each pixel lies on.
@@ -97,6 +97,13 @@ Keyframe MakeKeyframe(TrackedScan tracked,
 
 /// Whether a pixel of measured ranges shows what is at a range: within 0.1 m and 2 %.
 bool Sees(const Image<float>& measured_m, Pixel pixel, float range_m);
+
+/// Whether a pixel shows a surface that a point in the sensor frame lies on, to within a distance.
+bool LiesOnSurface(const RangeMeasurement& measurement,
+                   const SensorModel& sensor,
+                   Pixel pixel,
+                   const Eigen::Vector3f& point,
+                   float distance_m);
 
 /// Whether measured ranges are beyond a range in a pixel, and nowhere near it in the pixels around:
 /// there was nothing.

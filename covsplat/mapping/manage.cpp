@@ -131,12 +131,13 @@ GaussianSignals Joined(const GaussianMap& map,
 void CoverAndPrune(GaussianMap& map,
                    const SE3& T_map_sensor,
                    double reach_m,
+                   int first_keyframe,
                    double extent_factor,
                    const ManageConfig& config) {
   const NearGaussians near = map.Near(T_map_sensor, reach_m);
   const float limit = ControlQuantile(map, near, config.plane.control_quantile);
   const std::vector<std::uint8_t> is_next =
-      WhichAreNextToNew(near, map.Keyframes() - config.interval, config.plane.cell_m);
+      WhichAreNextToNew(near, first_keyframe, config.plane.cell_m);
   std::vector<std::size_t> chosen;
   std::vector<PlanarGaussian> planar;
   for (std::size_t i = 0; i < near.discs.size(); ++i) {
@@ -160,6 +161,10 @@ void CoverAndPrune(GaussianMap& map,
         keyframe, cover.disc, cover.opacity, Joined(map, near, members, AreaOf(cover.disc)));
   }
   exchange.Apply();
+}
+
+bool Covers(const ManageConfig& config) {
+  return config.mode == ManageMode::kPlane || config.mode == ManageMode::kFull;
 }
 
 /// The Gaussians to split, the most urgent first.
@@ -245,14 +250,24 @@ void Shed(GaussianMap& map, std::size_t max_gaussians) {
 void ManageMap(GaussianMap& map,
                const SE3& T_map_sensor,
                double reach_m,
+               int first_keyframe,
                double extent_factor,
                const ManageConfig& config) {
   map.PruneOpacity(config.prune_opacity);
-  const bool covers = config.mode == ManageMode::kPlane || config.mode == ManageMode::kFull;
   const bool splits = config.mode == ManageMode::kSplit || config.mode == ManageMode::kFull;
-  if (covers) CoverAndPrune(map, T_map_sensor, reach_m, extent_factor, config);
+  if (Covers(config)) {
+    CoverAndPrune(map, T_map_sensor, reach_m, first_keyframe, extent_factor, config);
+  }
   if (splits) Split(map, T_map_sensor, reach_m, extent_factor, config);
   Shed(map, LimitOf(config));
+}
+
+void JoinSurfaces(GaussianMap& map,
+                  const SE3& T_map_sensor,
+                  double reach_m,
+                  double extent_factor,
+                  const ManageConfig& config) {
+  if (Covers(config)) CoverAndPrune(map, T_map_sensor, reach_m, 0, extent_factor, config);
 }
 
 }  // namespace covsplat

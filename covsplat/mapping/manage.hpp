@@ -94,13 +94,21 @@ struct ManageConfig {
 inline constexpr std::size_t kBytesPerGaussian =
     sizeof(float) * (2 * kParameterCount + kMomentCount) + sizeof(GaussianSignals);
 
-/// One round around a pose: prunes by opacity, covers planes that hold Gaussians of the last
-/// `interval` keyframes, splits, and keeps the map within its limits. `extent_factor`: scale of a
-/// Gaussian in standard deviations of what it stands for (PatchConfig).
+/// One round around a pose: prunes by opacity, covers planes that hold Gaussians of
+/// `first_keyframe` or later ones, splits, and keeps the map within its limits. `extent_factor`:
+/// scale of a Gaussian in standard deviations of what it stands for (PatchConfig).
 void ManageMap(GaussianMap& map,
                const SE3& T_map_sensor,
                double reach_m,
+               int first_keyframe,
                double extent_factor,
                const ManageConfig& config);
+
+/// Surfaces that several keyframes hold, now that they lie upon each other, are covered by one.
+void JoinSurfaces(GaussianMap& map,
+                  const SE3& T_map_sensor,
+                  double reach_m,
+                  double extent_factor,
+                  const ManageConfig& config);
 
 }  // namespace covsplat

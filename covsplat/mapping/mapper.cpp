@@ -92,7 +92,7 @@ void Mapper::Spawn(const Keyframe& keyframe) {
       SpawnGaussians(keyframe, fit, render ? &*render : nullptr, staying, sensor_, config_.spawn);
   const int number = map_.AddKeyframe(keyframe, spawned);
   AddView(number);
-  map_.MarkSeen(number, keyframe, sensor_);
+  map_.MarkSeen(number, keyframe, sensor_, config_.feedback.max_keyframe_age);
   map_.PruneSeenThrough(config_.manage.prune_seen_through);
 }
 
@@ -144,8 +144,25 @@ void Mapper::Manage() {
   ManageMap(map_,
             map_.KeyframePose(map_.Keyframes() - 1),
             sensor_.MaxRange(),
+            map_.Keyframes() - config_.manage.interval,
             config_.spawn.patches.extent_factor,
             config_.manage);
+}
+
+/// What loops have brought together, all along the way.
+void Mapper::JoinPasses() {
+  const ScopedTimer timer(times_, "manage");
+  const double reach_m = sensor_.MaxRange();
+  std::vector<Eigen::Vector3d> done;
+  for (const View& view : views_) {
+    const SE3& pose = map_.KeyframePose(view.keyframe);
+    const bool is_done = std::ranges::any_of(done, [&](const Eigen::Vector3d& position) {
+      return (position - pose.Translation()).norm() < 0.5 * reach_m;
+    });
+    if (is_done) continue;
+    done.push_back(pose.Translation());
+    JoinSurfaces(map_, pose, reach_m, config_.spawn.patches.extent_factor, config_.manage);
+  }
 }
 
 void Mapper::Visit(int keyframe, int steps) {
@@ -179,6 +196,7 @@ void Mapper::OptimizeIdle() {
 void Mapper::Conclude() {
   if (views_.empty()) return;
   if (map_.Keyframes() % config_.manage.interval != 0) Manage();
+  if (T_map_odom_) JoinPasses();
   for (int left = config_.schedule.final_steps; left > 0;
        left -= config_.schedule.steps_per_visit) {
     Visit(RandomView(), std::min(left, config_.schedule.steps_per_visit));

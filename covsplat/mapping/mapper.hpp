@@ -119,6 +119,7 @@ class Mapper {
   void AddView(int keyframe);
   void ThinViews();
   void Manage();
+  void JoinPasses();
   void Visit(int keyframe, int steps);
   int RandomView();
   int RandomNearView();

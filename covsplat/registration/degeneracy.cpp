@@ -30,7 +30,20 @@ Eigen::Matrix3d SchurComplement(const Eigen::Matrix3d& a,
   return a - projected * inverse.asDiagonal() * projected.transpose();
 }
 
+Eigen::Matrix3d ProjectionWithout(const std::vector<Eigen::Vector3d>& directions) {
+  Eigen::Matrix3d projection = Eigen::Matrix3d::Identity();
+  for (const Eigen::Vector3d& d : directions) projection -= d * d.transpose();
+  return projection;
+}
+
 }  // namespace
+
+Matrix6d WithoutDirections(const Matrix6d& information, const WeakDirections& weak) {
+  Matrix6d held = Matrix6d::Zero();
+  held.topLeftCorner<3, 3>() = ProjectionWithout(weak.rotations);
+  held.bottomRightCorner<3, 3>() = ProjectionWithout(weak.translations);
+  return held * information * held;
+}
 
 WeakDirections FindWeakDirections(const Matrix6d& information,
                                   double mass,

@@ -1,6 +1,7 @@
 // Which directions of a pose a scan determines.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -14,6 +15,17 @@ struct WeakDirections {
   std::vector<Eigen::Vector3d> rotations;
   std::vector<Eigen::Vector3d> translations;
 };
+
+/// What registration tells of a pose.
+struct PoseKnowledge {
+  /// Right perturbation [rad, m], in 1/rad^2 and 1/m^2; zero in directions that surfaces do not
+  /// hold. Nothing if the pose was given.
+  std::optional<Matrix6d> information;
+  bool is_degenerate = false;  ///< whether there are such directions
+};
+
+/// Nothing is known any more in the weak directions.
+Matrix6d WithoutDirections(const Matrix6d& information, const WeakDirections& weak);
 
 /// Eigen-decomposes the information of the translation after the best rotation (the Schur
 /// complement H_tt - H_tr H_rr^-1 H_rt) and that of the rotation after the best translation. A

@@ -8,7 +8,6 @@
 
 #include <Eigen/Cholesky>
 
-#include "covsplat/registration/degeneracy.hpp"
 #include "covsplat/registration/motion_prior.hpp"
 #include "covsplat/registration/scan_residuals.hpp"
 
@@ -202,8 +201,7 @@ class Aligner {
     result_.inlier_ratio =
         static_cast<double>(moments.inliers) / static_cast<double>(result_.surfel.size());
     result_.rms_residual_m = std::sqrt(moments.plane_square / moments.kernel_square_sum);
-    result_.weak_rotations = weak_.rotations;
-    result_.weak_translations = weak_.translations;
+    result_.weak = weak_;
     result_.degenerate_directions =
         static_cast<int>(weak_.rotations.size() + weak_.translations.size());
     result_.information = PoseInformation();

@@ -8,6 +8,7 @@
 
 #include "covsplat/core/config_field.hpp"
 #include "covsplat/core/parallel.hpp"
+#include "covsplat/registration/degeneracy.hpp"
 #include "covsplat/registration/motion.hpp"
 #include "covsplat/registration/preprocess.hpp"
 #include "covsplat/registration/target.hpp"
@@ -100,8 +101,7 @@ struct AlignResult {
 
   /// Directions of the mid pose that the scan hardly determines.
   int degenerate_directions = 0;
-  std::vector<Eigen::Vector3d> weak_rotations;     ///< unit axes, sensor frame at mid scan
-  std::vector<Eigen::Vector3d> weak_translations;  ///< unit directions, sensor frame at mid scan
+  WeakDirections weak;  ///< which these are, sensor frame at mid scan
 };
 
 /// Estimates the motion of the sensor during a scan. Bit-identical for any number of threads.

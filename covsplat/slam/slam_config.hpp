@@ -67,8 +67,14 @@ struct EnumNames<LoopMode> {
       {{LoopMode::kOff, "off"}, {LoopMode::kOn, "on"}, {LoopMode::kOffline, "offline"}}};
 };
 
+/// What poses that are given instead of tracked stand for.
+enum class GivenPoses {
+  kExact,     ///< the truth: loops change nothing
+  kOdometry,  ///< what tracking would have found
+};
+
 struct LoopsConfig {
-  LoopMode mode = LoopMode::kOff;
+  LoopMode mode = LoopMode::kOn;
   LoopConfig closer;
   StitchConfig stitch;
 

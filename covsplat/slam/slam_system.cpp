@@ -68,8 +68,7 @@ std::vector<double> WaysAlong(const std::vector<SE3>& T_map_keyframe) {
 
 LoopKeyframe LoopKeyframeOf(int keyframe, const TrackedScan& tracked, double voxel_m) {
   return {tracked.T_odom_sensor,
-          tracked.weak_rotations,
-          tracked.weak_translations,
+          tracked.knowledge,
           MakePlace(keyframe, tracked.points, tracked.surface, tracked.covariance, voxel_m)};
 }
 
@@ -117,9 +116,9 @@ SlamSystem::SlamSystem(const SlamConfig& config,
 
 SlamSystem::~SlamSystem() { keyframes_.Close(); }
 
-void SlamSystem::UsePoses(Trajectory poses) {
+void SlamSystem::UsePoses(Trajectory poses, GivenPoses meaning) {
   given_poses_ = std::move(poses);
-  loops_.reset();
+  if (meaning == GivenPoses::kExact) loops_.reset();
 }
 
 std::optional<ScanRecord> SlamSystem::Process(const Scan& scan) {

@@ -53,7 +53,7 @@ class SlamSystem {
 
   /// Maps with these poses instead of tracking; scans without one are skipped. Before the first
   /// scan.
-  void UsePoses(Trajectory poses);
+  void UsePoses(Trajectory poses, GivenPoses meaning);
 
   /// Tracks a scan and hands it to the mapper if it is a keyframe. Nothing if it has no given pose.
   /// Not after Finish.

@@ -61,6 +61,11 @@ TrackerConfig WithMotionModel(TrackerConfig config) {
   return config;
 }
 
+PoseKnowledge KnowledgeOf(const AlignResult& align) {
+  if (align.correspondences == 0) return {};
+  return {WithoutDirections(align.information, align.weak), align.degenerate_directions > 0};
+}
+
 /// The motion within a scan if the sensor went on evenly from one mid-scan pose to the next.
 Vector6d TwistBetween(const SE3& T_from, const SE3& T_to, double gap_s, double duration_s) {
   if (gap_s <= 0.0 || duration_s <= 0.0) return Vector6d::Zero();
@@ -262,8 +267,7 @@ void Tracker::Conclude(const Scan& scan,
                        TrackResult& result) {
   const ScopedTimer timer(result.times, "deskew");
   result.tracked = Deskewed(scan, prepared, motion, result.align.squared_distance);
-  result.tracked.weak_rotations = result.align.weak_rotations;
-  result.tracked.weak_translations = result.align.weak_translations;
+  result.tracked.knowledge = KnowledgeOf(result.align);
   result.overlap = Overlap(result.align.squared_distance, config_.keyframe.overlap_distance_m);
   const double gap_s = prepared.timing.mid_stamp_s - last_stamp_s_;
   if (has_motion_ && gap_s > 0.0 && result.state == TrackState::kTracking) {

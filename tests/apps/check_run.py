@@ -142,6 +142,31 @@ def a_finished_run_becomes_meshes_clouds_and_renderings(bench):
 
 
 @case
+def a_finished_run_is_optimized_the_same_way_every_time(bench):
+    expect(bench.run(bench.good, "draft", "--threads", "2"), 0)
+    draft = bench.folder / "draft"
+    expect(bench.call("optimize", draft, "-o", "best", "--steps", "3"), 0, out="second pass")
+    best = bench.folder / "best"
+    assert all((best / name).is_file() for name in [*FILES, "loops/loops.csv"])
+    last_steps = 3 * metrics(draft)["map"]["keyframes"]
+    found = metrics(best)["map"]
+    assert found["optimizer_steps"] == 20 * found["keyframes"] + last_steps, found
+    assert [row[0] for row in poses(best)] == [row[0] for row in poses(draft)]
+    expect(bench.call("optimize", draft, "-o", "best2", "--steps", "3", "--threads", "1"), 0)
+    for file in ["trajectory_tum.txt", "map.ply"]:
+        assert (best / file).read_bytes() == (bench.folder / "best2" / file).read_bytes(), file
+    expect(bench.call("optimize", draft, "-o", "best"), 4, err="--overwrite")
+    expect(bench.call("optimize", bench.good, "-o", "x"), 3, err="config.yaml")
+    expect(bench.call("optimize", "nowhere", "-o", "x"), 3, err="nowhere")
+    moved = json.loads((draft / "metrics.json").read_text()) | {"recording": "gone"}
+    (draft / "metrics.json").write_text(json.dumps(moved))
+    expect(bench.call("optimize", draft, "-o", "x"), 3, err="--recording")
+    expect(bench.call("optimize", draft, "-o", "x", "--recording", "gone"), 3, err="gone")
+    expect(bench.call("optimize", draft, "-o", "found", "--recording", bench.good, "--steps",
+                      "0"), 0)
+
+
+@case
 def maps_convert_between_all_formats_and_every_verb_reads_them(bench):
     expect(bench.run(bench.good, "converted", "--deterministic"), 0)
     run = bench.folder / "converted"

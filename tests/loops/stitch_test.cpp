@@ -22,8 +22,8 @@ class StitchTest : public ::testing::Test {
       truth_.push_back(RoundTheBlock(10.0 + 2.0 * (k % kPass)));
       way_m_.push_back(2.0 * k + (k < kPass ? 0.0 : 200.0));
       const Place place = PlaceAt(city, k, truth_.back(), static_cast<std::uint64_t>(k), pool_);
-      for (std::size_t i = 0; i < place.points.size(); ++i) {
-        if (!place.normals[i].isZero()) surfels_.push_back({k, place.points[i], place.normals[i]});
+      for (const PlacePoint& point : place.points) {
+        if (point.IsFlat()) surfels_.push_back({k, point.Position(), point.Normal()});
       }
     }
     const SE3 off = MakePose(0.002, -0.003, 0.002, 0.08, -0.06, 0.04);

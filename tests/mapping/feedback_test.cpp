@@ -12,6 +12,7 @@ namespace covsplat::test {
 namespace {
 
 constexpr double kReach = 50.0;
+constexpr int kMaxAge = 100;
 
 struct Surfel {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -94,19 +95,19 @@ TEST_F(BuildTargetTest, LeavesOutWhatHasNotBeenSeenForLong) {
   for (int row = 0; row < sensor.Rows(); ++row) {
     ahead.measurement.range_m(row, sensor.Columns() / 2) = 5.0f;
   }
-  map_.MarkSeen(2, ahead, sensor);
+  map_.MarkSeen(2, ahead, sensor, kMaxAge);
   EXPECT_EQ(Build(one_keyframe)->Size(), 2u);
 }
 
 TEST_F(BuildTargetTest, LeavesOutWhatWasSeenThroughUntilItIsSeenAgain) {
   Add({{.mean = {5, 0, 0}}, {.mean = {0, 8, 0}}});
   const SensorModel sensor = ReducedSensor();
-  map_.MarkSeen(0, SphereKeyframe(SE3(), 8.0f), sensor);
+  map_.MarkSeen(0, SphereKeyframe(SE3(), 8.0f), sensor, kMaxAge);
   ASSERT_EQ(Build()->Size(), 1u);
   EXPECT_EQ(Build()->At(0).mean.y(), 8.0f);
   EXPECT_EQ(Build({.max_seen_through = 1})->Size(), 2u);
   EXPECT_EQ(Build({.mode = FeedbackMode::kNoFilter})->Size(), 2u);
-  map_.MarkSeen(0, SphereKeyframe(SE3(), 5.0f), sensor);
+  map_.MarkSeen(0, SphereKeyframe(SE3(), 5.0f), sensor, kMaxAge);
   EXPECT_EQ(Build()->Size(), 2u);
 }
 

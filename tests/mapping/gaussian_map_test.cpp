@@ -15,6 +15,7 @@ namespace {
 constexpr double kOpaque = 0.8;
 constexpr double kTransparent = 0.02;
 constexpr double kPruneOpacity = 0.05;
+constexpr int kMaxAge = 100;
 
 /// Gaussians that carry their own number everywhere: in the mean and in all signals. Every third is
 /// too transparent to stay.
@@ -125,7 +126,7 @@ TEST_F(GaussianMapTest, PrunesGaussiansThatAreNoLongerFinite) {
   }
   map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), broken);
   map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), spawned);
-  map_.MarkSeen(1, SphereKeyframe(SE3(), 5.0f), sensor_);  // must survive them
+  map_.MarkSeen(1, SphereKeyframe(SE3(), 5.0f), sensor_, kMaxAge);  // must survive them
   for (const Disc& disc : map_.Near(SE3(), 10.0).discs) {
     EXPECT_TRUE(disc.mean.allFinite() && disc.u.allFinite() && disc.v.allFinite());
   }
@@ -142,7 +143,7 @@ TEST_F(GaussianMapTest, MarksAsSeenOnlyWhatAKeyframeMeasuresInItsPlace) {
   const SE3 second = first * MakePose(0, 0, std::numbers::pi, 1, 0, 0);
   const Keyframe keyframe = SphereKeyframe(second, 4.0f);
   const int number = map_.AddKeyframe(keyframe, {});
-  map_.MarkSeen(number, keyframe, sensor_);
+  map_.MarkSeen(number, keyframe, sensor_, kMaxAge);
   EXPECT_EQ(LastSeen(0), 1);
   EXPECT_EQ(LastSeen(1), 0);
   EXPECT_EQ(LastSeen(2), 0);
@@ -151,15 +152,61 @@ TEST_F(GaussianMapTest, MarksAsSeenOnlyWhatAKeyframeMeasuresInItsPlace) {
 
 TEST_F(GaussianMapTest, PrunesWhatKeyframesInARowSeeThrough) {
   map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), GaussiansAt({{5, 0, 0}, {3, 0, 0}, {6, 0, 0}}));
+  map_.MarkSeen(0,
+                SphereKeyframe(SE3(), 5.0f),
+                sensor_,
+                kMaxAge);  // the second is in front, the third behind
+  EXPECT_EQ(map_.PruneSeenThrough(2), 0u);
   map_.MarkSeen(
-      0, SphereKeyframe(SE3(), 5.0f), sensor_);  // the second is in front, the third behind
+      0, SphereKeyframe(SE3(), 3.0f), sensor_, kMaxAge);  // now it is where it was: it counts anew
+  map_.MarkSeen(0, SphereKeyframe(SE3(), 5.0f), sensor_, kMaxAge);
   EXPECT_EQ(map_.PruneSeenThrough(2), 0u);
-  map_.MarkSeen(0, SphereKeyframe(SE3(), 3.0f), sensor_);  // now it is where it was: it counts anew
-  map_.MarkSeen(0, SphereKeyframe(SE3(), 5.0f), sensor_);
-  EXPECT_EQ(map_.PruneSeenThrough(2), 0u);
-  map_.MarkSeen(0, SphereKeyframe(SE3(), 5.0f), sensor_);
+  map_.MarkSeen(0, SphereKeyframe(SE3(), 5.0f), sensor_, kMaxAge);
   EXPECT_EQ(map_.PruneSeenThrough(2), 1u);
   EXPECT_EQ(map_.Size(), 2u);
+}
+
+TEST_F(GaussianMapTest, KeepsWhatWasLongUnseenWhileTheWayMayHaveDrifted) {
+  // Two walls of spheres that a drifted keyframe sees 1 m farther away, or one of them.
+  std::vector<Eigen::Vector3d> wall;
+  for (int i = 0; i < 100; ++i) {
+    wall.push_back(Eigen::AngleAxisd(0.01 * i, Eigen::Vector3d::UnitZ()) *
+                   Eigen::Vector3d(5, 0, 0));
+  }
+  const auto through_after = [&](int keyframes, std::size_t moved) {
+    map_ = GaussianMap(std::move(MakeSplatEngine(Backend::kCpu, sensor_, {}, pool_).value()));
+    std::vector<Eigen::Vector3d> points = wall;
+    for (std::size_t i = 0; i < moved; ++i) points[i] *= 0.8;
+    map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), GaussiansAt(points));
+    Keyframe sphere = SphereKeyframe(SE3(), 5.0f);
+    for (int row = 0; row < sensor_.Rows(); ++row) {
+      for (int column = 0; column < sensor_.Columns(); ++column) {
+        sphere.measurement.normal(row, column) = -sensor_.RayOf(row, column);
+      }
+    }
+    for (int k = 0; k < 2; ++k) map_.MarkSeen(keyframes + k, sphere, sensor_, kMaxAge);
+    return map_.PruneSeenThrough(2);
+  };
+  EXPECT_EQ(through_after(kMaxAge - 1, 40), 40u) << "a moment ago they were there";
+  EXPECT_EQ(through_after(kMaxAge + 1, 40), 0u) << "all of the map is elsewhere";
+  EXPECT_EQ(through_after(kMaxAge + 1, 4), 4u) << "the others are where they were";
+}
+
+TEST_F(GaussianMapTest, SeesWhatWasLongUnseenAgainOnlyOnTheSurfaceThatIsMeasured) {
+  map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), GaussiansAt({{5.15, 0, 0}, {5.05, 0.05, 0}}));
+  Keyframe sphere = SphereKeyframe(SE3(), 5.0f);
+  map_.MarkSeen(kMaxAge, sphere, sensor_, kMaxAge);
+  EXPECT_EQ(LastSeen(0), kMaxAge) << "a moment ago within 10 cm and 2 %";
+  map_.MarkSeen(3 * kMaxAge, sphere, sensor_, kMaxAge);
+  EXPECT_EQ(LastSeen(1), kMaxAge) << "without a normal nobody knows";
+  for (int row = 0; row < sensor_.Rows(); ++row) {
+    for (int column = 0; column < sensor_.Columns(); ++column) {
+      sphere.measurement.normal(row, column) = -sensor_.RayOf(row, column);
+    }
+  }
+  map_.MarkSeen(3 * kMaxAge, sphere, sensor_, kMaxAge);
+  EXPECT_EQ(LastSeen(0), kMaxAge);
+  EXPECT_EQ(LastSeen(1), 3 * kMaxAge);
 }
 
 TEST_F(GaussianMapTest, FindsDiscsAroundAPoseInItsFrame) {
@@ -179,11 +226,13 @@ TEST_F(GaussianMapTest, FindsDiscsAroundAPoseInItsFrame) {
 TEST_F(GaussianMapTest, DoesNotMarkAsSeenWhatIsBehindAGapOrOutOfView) {
   map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), GaussiansAt({{5, 0, 0}, {0.1, 0, 5}}));
   map_.AddKeyframe(SphereKeyframe(SE3(), 0.0f), {});
-  map_.MarkSeen(1, SphereKeyframe(SE3(), 0.0f), sensor_);  // no returns at all
-  map_.MarkSeen(
-      1, SphereKeyframe(SE3(), 4.7f), sensor_);  // something in front, beyond the tolerance
+  map_.MarkSeen(1, SphereKeyframe(SE3(), 0.0f), sensor_, kMaxAge);  // no returns at all
+  map_.MarkSeen(1,
+                SphereKeyframe(SE3(), 4.7f),
+                sensor_,
+                kMaxAge);  // something in front, beyond the tolerance
   EXPECT_EQ(LastSeen(0), 0);
-  map_.MarkSeen(1, SphereKeyframe(SE3(), 4.9f), sensor_);  // within 10 cm + 2 %
+  map_.MarkSeen(1, SphereKeyframe(SE3(), 4.9f), sensor_, kMaxAge);  // within 10 cm + 2 %
   EXPECT_EQ(LastSeen(0), 1);
   EXPECT_EQ(LastSeen(1), 0) << "nearly straight above";
 }

@@ -42,7 +42,10 @@ class ManageMapTest : public ::testing::Test {
   void Add(const SpawnedGaussians& spawned) {
     map_.AddKeyframe(SphereKeyframe(pose_, 0.0f), spawned);
   }
-  void Manage(const ManageConfig& config) { ManageMap(map_, pose_, kReach, kExtentFactor, config); }
+  void Manage(const ManageConfig& config) {
+    const int first_keyframe = map_.Keyframes() - config.interval;
+    ManageMap(map_, pose_, kReach, first_keyframe, kExtentFactor, config);
+  }
   RenderOutput Render() { return map_.Engine().Render(pose_); }
   struct Means {
     double range_m = 0.0;
@@ -149,6 +152,25 @@ TEST_F(ManageMapTest, CoversAPlaneOnceAndLeavesItThenToNewGaussians) {
   EXPECT_EQ(map_.Size(), covered) << "nothing new";
   Add(Wall(0.1f));  // the same again, upon what is there
   Manage(config);
+  EXPECT_LE(map_.Size(), covered + covered / 4);
+}
+
+TEST_F(ManageMapTest, JoinsTheSurfacesOfTwoPassesOnceTheyLieUponEachOther) {
+  ManageConfig config = In(ManageMode::kPlane);
+  config.interval = 1;
+  Add(Wall(0.1f));
+  Manage(config);
+  const std::size_t covered = map_.Size();
+  const SE3 drifted = pose_ * MakePose(0, 0, 0, 0.3, 0, 0);
+  map_.AddKeyframe(SphereKeyframe(drifted, 0.0f), Wall(0.1f));
+  Manage(config);
+  ASSERT_GE(map_.Size(), 2 * covered - covered / 4) << "a double wall";
+  const SE3 nearly = pose_ * MakePose(0, 0, 0, 0.01, 0, 0);
+  map_.Engine().SetAnchorPose(1, nearly);
+  map_.AddKeyframe(SphereKeyframe(pose_, 0.0f), {});
+  Manage(config);
+  ASSERT_GE(map_.Size(), 2 * covered - covered / 4) << "neither is new";
+  JoinSurfaces(map_, pose_, kReach, kExtentFactor, config);
   EXPECT_LE(map_.Size(), covered + covered / 4);
 }
 

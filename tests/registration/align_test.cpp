@@ -80,9 +80,9 @@ TEST(Align, ReportsTheDirectionAlongACorridorAndKeepsItsPrediction) {
     const RegistrationTarget target = TargetFrom(StillCloud(Corridor(), SE3(), noise, 1, pool));
     const SourceCloud source = StillCloud(Corridor(), truth, noise, 2, pool);
     const AlignResult result = Align(source, target, At(SE3()), GicpConfig{}, pool);
-    ASSERT_EQ(result.weak_translations.size(), 1u) << noise;
-    EXPECT_TRUE(result.weak_rotations.empty()) << noise;
-    const Eigen::Vector3d along = truth.Rotation() * result.weak_translations[0];
+    ASSERT_EQ(result.weak.translations.size(), 1u) << noise;
+    EXPECT_TRUE(result.weak.rotations.empty()) << noise;
+    const Eigen::Vector3d along = truth.Rotation() * result.weak.translations[0];
     EXPECT_GT(std::abs(along.x()), 0.999) << noise;
     EXPECT_NEAR(result.motion.T_map_sensor.Translation().x(), 0.0, 0.005) << noise;
     EXPECT_NEAR(result.motion.T_map_sensor.Translation().y(), 0.05, 0.005) << noise;
@@ -97,9 +97,9 @@ TEST(Align, ReportsTwoTranslationsAndTheTurnAboveASinglePlane) {
     const RegistrationTarget target = TargetFrom(StillCloud(Floor(), SE3(), noise, 1, pool));
     const SourceCloud source = StillCloud(Floor(), truth, noise, 2, pool);
     const AlignResult result = Align(source, target, At(SE3()), GicpConfig{}, pool);
-    ASSERT_EQ(result.weak_translations.size(), 2u) << noise;
-    ASSERT_EQ(result.weak_rotations.size(), 1u) << noise;
-    EXPECT_GT(std::abs(result.weak_rotations[0].z()), 0.99) << noise;
+    ASSERT_EQ(result.weak.translations.size(), 2u) << noise;
+    ASSERT_EQ(result.weak.rotations.size(), 1u) << noise;
+    EXPECT_GT(std::abs(result.weak.rotations[0].z()), 0.99) << noise;
     EXPECT_NEAR(result.motion.T_map_sensor.Translation().z(), 0.05, 0.003) << noise;
   }
 }

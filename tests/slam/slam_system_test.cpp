@@ -264,7 +264,7 @@ TEST_P(BothSchedules, MapWithGivenPosesAndSkipScansWithout) {
     poses.push_back({stamp, HandheldWalk(stamp)});
   }
   const std::unique_ptr<SlamSystem> system = Create(Config(GetParam()));
-  system->UsePoses(poses);
+  system->UsePoses(poses, GivenPoses::kExact);
   std::vector<int> mapped;
   for (int k = 0; k < 6; ++k) {
     const std::optional<ScanRecord> record = system->Process(scans[static_cast<std::size_t>(k)]);
