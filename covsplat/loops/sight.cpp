@@ -30,7 +30,8 @@ std::optional<std::size_t> DirectionOf(const Eigen::Vector3f& point) {
 
 }  // namespace
 
-Sight::Sight(std::span<const Eigen::Vector3f> points) : nearest_cm_(kRows * kColumns, 0) {
+Sight::Sight(std::span<const Eigen::Vector3f> points)
+    : nearest_cm_(static_cast<std::size_t>(kRows) * kColumns, 0) {
   for (const Eigen::Vector3f& point : points) {
     const auto direction = DirectionOf(point);
     if (!direction) continue;

@@ -93,8 +93,8 @@ class Mapper {
   /// are newer along with the last of them. The frame of odometry moves in the map as the newest
   /// keyframe does, so that where scans are tracked nothing jumps.
   void Correct(std::span<const SE3> T_map_keyframe);
-  /// Nothing until then: both frames are the same.
-  const std::optional<SE3>& T_map_odom() const { return T_map_odom_; }
+  /// T_map_odom; nothing until then: both frames are the same.
+  const std::optional<SE3>& OdomPose() const { return T_map_odom_; }
 
   const GaussianMap& Map() const { return map_; }
   /// What the map, or the map as it was spawned, looks like from a pose.

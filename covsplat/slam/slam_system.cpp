@@ -205,7 +205,7 @@ void SlamSystem::Correct() {
   const std::optional<std::vector<SE3>> T_map_keyframe = loops_->TakeCorrection();
   if (!T_map_keyframe) return;
   mapper_.Correct(*T_map_keyframe);
-  T_map_odom_.Publish(std::make_shared<const SE3>(*mapper_.T_map_odom()));
+  T_map_odom_.Publish(std::make_shared<const SE3>(*mapper_.OdomPose()));
 }
 
 // Loops are known to centimetres; the surfaces that two passes share say more.
@@ -299,8 +299,8 @@ SE3 SlamSystem::OdometryPoseOf(std::int64_t scan) const {
 }
 
 SE3 SlamSystem::PoseOf(std::int64_t scan) const {
-  const SE3 T_odom_scan = OdometryPoseOf(scan);
-  if (!mapper_.T_map_odom()) return T_odom_scan;
+  SE3 T_odom_scan = OdometryPoseOf(scan);
+  if (!mapper_.OdomPose()) return T_odom_scan;
   const auto as_seen_from = [&](auto keyframe) {
     const SE3 T_keyframe_scan = OdometryPoseOf(*keyframe).Inverse() * T_odom_scan;
     const auto number = static_cast<int>(keyframe - keyframe_scans_.begin());

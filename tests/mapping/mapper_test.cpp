@@ -209,7 +209,7 @@ TEST_F(MapperTest, ACorrectionMovesGaussiansWithTheirKeyframesAndNothingForTheTr
   const auto seen_from = [&](int k) { return mapper->Map().Near(pose(k), 100.0); };
   const NearGaussians before = seen_from(1);
   const auto target = mapper->MakeTarget(PoseOfKeyframe(3));
-  EXPECT_FALSE(mapper->T_map_odom());
+  EXPECT_FALSE(mapper->OdomPose());
 
   // A loop moves the first three, each otherwise; the fourth goes with the third.
   std::vector<SE3> corrected;
@@ -234,8 +234,8 @@ TEST_F(MapperTest, ACorrectionMovesGaussiansWithTheirKeyframesAndNothingForTheTr
   EXPECT_GT(of_the_second, 10u);
 
   // In the frame of odometry the newest keyframe and what came with it are where they were.
-  ASSERT_TRUE(mapper->T_map_odom());
-  EXPECT_LT(TranslationError(*mapper->T_map_odom() * PoseOfKeyframe(3), pose(3)), 1e-9);
+  ASSERT_TRUE(mapper->OdomPose());
+  EXPECT_LT(TranslationError(*mapper->OdomPose() * PoseOfKeyframe(3), pose(3)), 1e-9);
   const auto moved = mapper->MakeTarget(PoseOfKeyframe(3));
   ASSERT_EQ(moved->Size(), target->Size());
   EXPECT_LT((moved->OriginMap() - target->OriginMap()).norm(), 1e-9);
