@@ -150,7 +150,7 @@ TEST(LoopsInSlam, AreClosedAtTheEndIfSoWanted) {
 }
 
 TEST(LoopsInSlam, LoseNothingWhereverARunIsStopped) {
-  for (const int scans : {kScans / 10, kScans - 31, kScans - 8}) {
+  for (const int scans : {kScans / 10, kScans - kScans / 8, kScans - kScans / 25}) {
     const Lap lap = RunLap(LoopMode::kOn, Schedule::kThreaded, 2, scans);
     ASSERT_EQ(static_cast<int>(lap.records.size()), scans);
     for (int k = 1; k < scans; ++k) {
