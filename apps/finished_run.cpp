@@ -29,14 +29,7 @@ Result<void> CheckFolder(const fs::path& folder) {
                 "or a map file",
                 folder.string());
   }
-  for (const char* name : {"config.yaml", "trajectory_tum.txt", "keyframes_tum.txt"}) {
-    if (fs::exists(folder / name, ignored)) continue;
-    return Fail(ErrorCode::kInput,
-                "{}: has no {}; name a folder that `covsplat run` wrote and finished",
-                folder.string(),
-                name);
-  }
-  return {};
+  return CheckRunFiles(folder, {"config.yaml", "trajectory_tum.txt", "keyframes_tum.txt"});
 }
 
 Result<AppConfig> ConfigOf(const std::string& yaml, const std::string& name) {
@@ -126,6 +119,17 @@ AppConfig ConfigOrDefaults(const std::string& yaml, const fs::path& run_or_map) 
 }
 
 }  // namespace
+
+Result<void> CheckRunFiles(const fs::path& folder, std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    if (IsFile(folder / name)) continue;
+    return Fail(ErrorCode::kInput,
+                "{}: has no {}; name a folder that `covsplat run` wrote and finished",
+                folder.string(),
+                name);
+  }
+  return {};
+}
 
 Result<MapFile> ReadRunMap(const fs::path& run_or_map) {
   if (!IsFile(run_or_map)) return ReadMapIn(run_or_map);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
 
 #include "apps/app_config.hpp"
@@ -20,6 +21,10 @@ struct FinishedRun {
   SurfelMap map;
   std::size_t broken = 0;  ///< Gaussians that were left out because they are not finite
 };
+
+/// Whether a run's folder has all of these files; the error names the first that is missing.
+Result<void> CheckRunFiles(const std::filesystem::path& folder,
+                           std::initializer_list<const char*> names);
 
 /// The map of a run's folder (map.ply or, without it, map.csmap, with keyframes_tum.txt and
 /// config.yaml) or of a map file. Errors name the file that is missing, damaged or does not belong

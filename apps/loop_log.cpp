@@ -1,6 +1,5 @@
 #include "apps/loop_log.hpp"
 
-#include <algorithm>
 #include <string>
 
 #include <fmt/format.h>
@@ -40,11 +39,6 @@ Result<void> WriteLoops(const std::filesystem::path& folder,
   return WriteFileAtomically(folder / "loops.csv", text).and_then([&] {
     return WriteG2o(folder / "pose_graph.g2o", closer.Graph());
   });
-}
-
-std::int64_t CountLoops(const LoopCloser& closer, LoopFate fate) {
-  return std::ranges::count_if(closer.Loops(),
-                               [&](const LoopRecord& loop) { return loop.check.fate == fate; });
 }
 
 }  // namespace covsplat

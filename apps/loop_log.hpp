@@ -16,7 +16,4 @@ Result<void> WriteLoops(const std::filesystem::path& folder,
                         const LoopCloser& closer,
                         std::span<const std::int64_t> keyframe_scans);
 
-/// How many loops have this fate.
-std::int64_t CountLoops(const LoopCloser& closer, LoopFate fate);
-
 }  // namespace covsplat

@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "apps/facts.hpp"
+#include "apps/finished_run.hpp"
 #include "apps/run_log.hpp"
 #include "apps/slam_run.hpp"
 #include <fmt/format.h>
@@ -28,20 +30,22 @@ struct KnownRun {
 };
 
 Result<fs::path> RecordingOf(const OptimizeRequest& request) {
-  if (request.recording) return *request.recording;
+  std::error_code ignored;
+  if (request.recording) {
+    if (fs::exists(*request.recording, ignored)) return *request.recording;
+    return Fail(ErrorCode::kInput,
+                "{}: does not exist; name the run's recording with --recording",
+                request.recording->string());
+  }
   const fs::path file = request.run / "metrics.json";
-  const Result<std::string> text = ReadFile(file);
-  if (!text) return Forward(text);
-  const auto metrics = nlohmann::json::parse(*text, nullptr, false);
-  const bool is_known =
-      metrics.is_object() && metrics.contains("recording") && metrics["recording"].is_string();
-  if (!is_known) {
+  const auto facts = RunFacts(request.run);
+  if (!facts) return Forward(facts);
+  if (!facts->contains("recording") || !(*facts)["recording"].is_string()) {
     return Fail(ErrorCode::kInput,
                 "{}: does not say of which recording; name it with --recording",
                 file.string());
   }
-  const fs::path recording = metrics["recording"].get<std::string>();
-  std::error_code ignored;
+  const fs::path recording = (*facts)["recording"].get<std::string>();
   if (fs::exists(recording, ignored)) return recording;
   return Fail(ErrorCode::kInput,
               "{}: is of the recording {}, which is not there; name it with --recording",
@@ -71,15 +75,9 @@ Result<Trajectory> TrackedPoses(const fs::path& run) {
 
 Result<KnownRun> ReadKnown(const OptimizeRequest& request) {
   KnownRun known;
-  for (const char* name :
-       {"config.yaml", "trajectory_tum.txt", "keyframes_tum.txt", "frames.csv"}) {
-    std::error_code ignored;
-    if (fs::is_regular_file(request.run / name, ignored)) continue;
-    return Fail(ErrorCode::kInput,
-                "{}: has no {}; name a folder that `covsplat run` wrote and finished",
-                request.run.string(),
-                name);
-  }
+  const Result<void> complete = CheckRunFiles(
+      request.run, {"config.yaml", "trajectory_tum.txt", "keyframes_tum.txt", "frames.csv"});
+  if (!complete) return Forward(complete);
   Result<Trajectory> tracked = TrackedPoses(request.run);
   if (!tracked) return Forward(tracked);
   known.tracked = std::move(*tracked);

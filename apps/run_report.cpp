@@ -5,7 +5,6 @@
 #include <ctime>
 #include <limits>
 
-#include "apps/loop_log.hpp"
 #include "apps/run_log.hpp"
 #include "apps/system_info.hpp"
 #include <fmt/format.h>
@@ -63,7 +62,7 @@ void AddLoops(const SlamSystem& system, const RunResults& results, ReportData& d
 std::string FatesOf(const LoopCloser& loops) {
   std::string text;
   for (const auto& [fate, name] : EnumNames<LoopFate>::kNames) {
-    const std::int64_t count = CountLoops(loops, fate);
+    const std::int64_t count = loops.Count(fate);
     if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, name);
   }
   return text.empty() ? "no place was seen again" : text;

@@ -151,7 +151,7 @@ double SecondsSince(std::chrono::steady_clock::time_point start) {
 Result<void> TakeLoops(Prepared& run, const ScanSelection& scans) {
   const LoopCloser* loops = run.system->Loops();
   if (loops == nullptr) return {};
-  run.results.loops = {CountLoops(*loops, LoopFate::kAccepted),
+  run.results.loops = {loops->Count(LoopFate::kAccepted),
                        static_cast<std::int64_t>(loops->Loops().size())};
   for (ScanRecord& record : run.results.records) {
     record.T_map_sensor = run.system->PoseOf(record.scan);

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import page
 import report
+from covsplat_run import simulate_seed
 from measures import Job, Measures, World, measured
-from processes import run_program
 from variants import TABLES, Table, Variant, all_variants
 
 PAPER_NAMES = ("paper, quad", "paper, Keble")
@@ -95,9 +95,7 @@ def simulate(covsplat: Path, job: Job) -> None:
     folder = job.world.folder
     if (folder / "gt_tum.txt").is_file():  # written last
         return
-    command = [str(covsplat), "simulate", job.world.name, "--sensor", "os1-64"]
-    command += ["--motion", "walking", "--seed", str(job.seed), "-o", str(folder)]
-    run_program([*command, "--overwrite", "--quiet"])
+    simulate_seed(covsplat, job.world.name, job.seed, folder)
 
 
 def tables(table: Table, worlds: list[str], found: Found) -> str:

@@ -18,6 +18,7 @@ import page
 import report
 from covsplat_run import TRACKING, ate_m, frames_of, stage_ms
 from processes import run_program
+from se3 import ways_along
 
 MAPPING = ("keyframe", "optimize", "target")  # keyframe contains the other stages
 HEADER = (
@@ -71,8 +72,7 @@ def parse() -> argparse.Namespace:
 
 def scans_of(run: Path) -> list[Scan]:
     positions_m = np.loadtxt(run / "trajectory_tum.txt")[:, 1:4]
-    steps_m = np.linalg.norm(np.diff(positions_m, axis=0), axis=1)
-    way_m = np.concatenate([[0.0], np.cumsum(steps_m)])
+    way_m = ways_along(positions_m)
     frames = frames_of(run)
     if len(frames) != len(way_m):
         raise SystemExit(f"{run}: {len(frames)} scans were tracked, {len(way_m)} have poses")

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from recording import Recording
-from se3 import Array, Trajectory, rotations_of
+from se3 import Array, Trajectory, rotations_of, ways_along
 
 # A loop that is farther off is one of another place.
 WRONG_M = 0.5
@@ -81,11 +81,6 @@ def is_wrong(error: Array) -> bool:
     return bool(
         np.linalg.norm(error[:3, 3]) > WRONG_M or np.degrees(np.arccos(cosine)) > WRONG_DEG
     )
-
-
-def ways_along(positions: Array) -> Array:
-    steps_m = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps_m)])
 
 
 def revisits_of(truth: Array) -> list[range]:

@@ -20,11 +20,11 @@ import peers
 import report
 import track_runs
 from covsplat_run import base_command, mesh_of_run, score_mesh
-from loop_measures import LoopFacts, loop_facts, thickness_m, ways_along
+from loop_measures import LoopFacts, loop_facts, thickness_m
 from processes import apart, run_program
 from recording import Recording, azimuth_periods, marked
 from report import number
-from se3 import Trajectory
+from se3 import Trajectory, ways_along
 
 HEADER = (
     "recording",

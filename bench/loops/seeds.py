@@ -16,13 +16,11 @@ from pathlib import Path
 
 import page
 import report
-from covsplat_run import ate_m, base_command
+from covsplat_run import ate_m, base_command, simulate_seed
 from loop_measures import LoopFacts, loop_facts
 from processes import run_program
 from recording import Recording
 
-SENSORS = {"street": ("hdl-64e", "vehicle")}
-WALKING = ("os1-64", "walking")
 HEADER = ("world", "seeds", "looked at", "accepted", "wrong", "worst mm", "revisits found", "ATE mm")
 
 
@@ -60,10 +58,7 @@ def parse() -> argparse.Namespace:
 def closed(world: str, seed: int, options: argparse.Namespace) -> Found:
     """Gaussians stay as they are spawned: refined ones change little of what loops see."""
     folder = options.out / f"{world}-{seed}"
-    sensor, motion = SENSORS.get(world, WALKING)
-    command = [str(options.covsplat), "simulate", world, "--sensor", sensor, "--motion", motion]
-    command += ["--seed", str(seed), "-o", str(folder / "recording")]
-    run_program([*command, "--overwrite", "--quiet"])
+    simulate_seed(options.covsplat, world, seed, folder / "recording")
     recording = Recording.open(folder / "recording")
     command = base_command(options.covsplat, recording, folder / "run", threads=1)
     command += ["--deterministic", "--quiet", "--loops", "on"]

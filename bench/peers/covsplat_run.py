@@ -25,6 +25,13 @@ def base_command(binary: Path, recording: Recording, out: Path, threads: int) ->
     return command
 
 
+def simulate_seed(binary: Path, world: str, seed: int, folder: Path) -> None:
+    """A world of a kind, by the sensor and motion that fit it."""
+    sensor, motion = ("hdl-64e", "vehicle") if world == "street" else ("os1-64", "walking")
+    command = [str(binary), "simulate", world, "--sensor", sensor, "--motion", motion]
+    run_program([*command, "--seed", str(seed), "-o", str(folder), "--overwrite", "--quiet"])
+
+
 def run_covsplat(
     binary: Path, recording: Recording, out: Path, threads: int, *, mapping: bool
 ) -> Outcome:

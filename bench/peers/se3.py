@@ -148,14 +148,20 @@ def position_errors(estimate: Array, truth: Array) -> Array:
     return np.linalg.norm(aligned - truth, axis=1)
 
 
+def ways_along(positions: Array) -> Array:
+    """From the first position to each, along all between."""
+    way_m = np.zeros(len(positions))
+    way_m[1:] = np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))
+    return way_m
+
+
 def relative_errors(estimate: Array, truth: Array, distance_m: float) -> Array:
     """Errors in metres of the motion over consecutive steps of poses [N, 4, 4].
 
     A step ends at the first pose from which the truth's way since the start of the step is
     `distance_m` or more (docs/metrics.md).
     """
-    way_m = np.zeros(len(truth))
-    way_m[1:] = np.cumsum(np.linalg.norm(np.diff(truth[:, :3, 3], axis=0), axis=1))
+    way_m = ways_along(truth[:, :3, 3])
     ends = [0]
     while (end := int(np.searchsorted(way_m, way_m[ends[-1]] + distance_m - 1e-9))) < len(truth):
         ends.append(end)

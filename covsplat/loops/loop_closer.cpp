@@ -263,6 +263,11 @@ bool LoopCloser::Undo(const std::vector<double>& weight) {
   return undone;
 }
 
+std::int64_t LoopCloser::Count(LoopFate fate) const {
+  return std::ranges::count_if(loops_,
+                               [&](const LoopRecord& loop) { return loop.check.fate == fate; });
+}
+
 PoseGraph LoopCloser::GraphWith(double odometry_scale, bool loops_are_doubtful) const {
   PoseGraph graph = graph_;
   for (std::size_t e = 0; e < links_.size(); ++e) {

@@ -169,6 +169,8 @@ class LoopCloser {
   PoseGraph Graph() const;
   const std::vector<SE3>& Poses() const { return graph_.T_map_node; }
   const std::vector<LoopRecord>& Loops() const { return loops_; }
+  /// How many of them have this fate.
+  std::int64_t Count(LoopFate fate) const;
   /// Whether any was accepted.
   bool HasLoops() const {
     return graph_.edges.size() >= graph_.T_map_node.size() && !Poses().empty();

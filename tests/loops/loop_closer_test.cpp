@@ -34,11 +34,6 @@ class LoopCloserTest : public ::testing::Test {
     return (Vector6d() << 0.0, 0.0, turn_rad, 0.0, 0.0, climb_m).finished();
   }
 
-  static int Count(const LoopCloser& closer, LoopFate fate) {
-    return static_cast<int>(std::ranges::count_if(
-        closer.Loops(), [&](const LoopRecord& loop) { return loop.check.fate == fate; }));
-  }
-
   ThreadPool pool_{2};
   const RayScene city_ = BlockCity();
   int corrections_ = 0;
@@ -55,13 +50,13 @@ TEST_F(LoopCloserTest, ALapThatDriftedIsClosed) {
         worst,
         TranslationError(closer.Poses()[static_cast<std::size_t>(k)], RoundTheBlock(kStepM * k)));
   }
-  std::printf("drift %.2f m, afterwards %.3f m at most; %zu looked at, %d accepted\n",
+  std::printf("drift %.2f m, afterwards %.3f m at most; %zu looked at, %lld accepted\n",
               drift,
               worst,
               closer.Loops().size(),
-              Count(closer, LoopFate::kAccepted));
+              static_cast<long long>(closer.Count(LoopFate::kAccepted)));
   EXPECT_GT(drift, 0.6);
-  EXPECT_GE(Count(closer, LoopFate::kAccepted), 2);
+  EXPECT_GE(closer.Count(LoopFate::kAccepted), 2);
   EXPECT_GE(corrections_, 1);
   // Where the lap meets itself it fits.
   for (int k = kLap; k < kLap + 20; ++k) {
@@ -75,7 +70,7 @@ TEST_F(LoopCloserTest, ALapThatDriftedIsClosed) {
 TEST_F(LoopCloserTest, WithoutDriftNothingMoves) {
   LoopCloser closer({}, pool_);
   Drive(closer, kLap + 10, Drift(0.0, 0.0));
-  EXPECT_GE(Count(closer, LoopFate::kAccepted), 2);
+  EXPECT_GE(closer.Count(LoopFate::kAccepted), 2);
   for (int k = 0; k < kLap + 10; ++k) {
     EXPECT_LT(
         TranslationError(closer.Poses()[static_cast<std::size_t>(k)], RoundTheBlock(kStepM * k)),
@@ -108,8 +103,8 @@ TEST_F(LoopCloserTest, NoLoopIsFarFromWhatOdometryAllows) {
   config.looks.enabled = false;
   LoopCloser closer(config, pool_);
   Drive(closer, kLap + 10, Drift(2e-4, 0.004));
-  EXPECT_EQ(Count(closer, LoopFate::kAccepted), 0);
-  EXPECT_GE(Count(closer, LoopFate::kTooFar), 1);
+  EXPECT_EQ(closer.Count(LoopFate::kAccepted), 0);
+  EXPECT_GE(closer.Count(LoopFate::kTooFar), 1);
   EXPECT_EQ(corrections_, 0);
 }
 

@@ -99,11 +99,7 @@ Lap RunLap(LoopMode mode, Schedule schedule, int threads, int scans = kScans) {
 }
 
 int Accepted(const Lap& lap) {
-  int accepted = 0;
-  for (const LoopRecord& loop : lap.system->Loops()->Loops()) {
-    accepted += loop.check.fate == LoopFate::kAccepted ? 1 : 0;
-  }
-  return accepted;
+  return static_cast<int>(lap.system->Loops()->Count(LoopFate::kAccepted));
 }
 
 TEST(LoopsInSlam, AreClosedWhileTrackingGoesOn) {
