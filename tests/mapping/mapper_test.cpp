@@ -246,5 +246,20 @@ TEST_F(MapperTest, ACorrectionMovesGaussiansWithTheirKeyframesAndNothingForTheTr
   EXPECT_LT(TranslationError(pose(3).Inverse() * pose(4), step), 1e-9);
 }
 
+TEST_F(MapperTest, InTheEndSurfacesThatLoopsBroughtTogetherAreJoined) {
+  MapperConfig config = Frozen();
+  config.manage.interval = 1;
+  const auto mapper = MakeMapper(config);
+  mapper->Insert(KeyframeAt(0));
+  Keyframe drifted = KeyframeAt(0);
+  drifted.tracked.T_odom_sensor = MakePose(0, 0, 0, 0.5, 0.5, 0.5) * PoseOfKeyframe(0);
+  mapper->Insert(std::move(drifted));
+  const std::size_t twice = mapper->Map().Size();
+  mapper->Correct(std::vector<SE3>{PoseOfKeyframe(0), PoseOfKeyframe(0)});
+  EXPECT_EQ(mapper->Map().Size(), twice);
+  mapper->Conclude();
+  EXPECT_LT(mapper->Map().Size(), 9 * twice / 10);
+}
+
 }  // namespace
 }  // namespace covsplat::test
