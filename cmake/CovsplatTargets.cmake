@@ -27,6 +27,22 @@ function(covsplat_module name)
   target_link_libraries(covsplat_${name} PUBLIC covsplat_options ${ARG_DEPS})
 endfunction()
 
+# covsplat_simd(<name>): a module with kernels for several instruction sets, of which Highway picks
+# one at run time.
+function(covsplat_simd name)
+  target_link_libraries(covsplat_${name} PUBLIC hwy::hwy)
+  # SSE4 (the baseline), AVX2 and AVX-512 on x86; further levels would only lengthen the build.
+  target_compile_definitions(covsplat_${name} PRIVATE
+    HWY_DISABLE_PCLMUL_AES "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_AVX3_DL)")
+  if(COVSPLAT_SANITIZE)
+    # One level is enough to find undefined behaviour and races, and sanitised kernels compile
+    # slowly.
+    target_compile_definitions(covsplat_${name} PRIVATE HWY_COMPILE_ONLY_STATIC)
+  endif()
+  # Packs of vectors are passed between inlined functions only: their calling convention is moot.
+  target_compile_options(covsplat_${name} PRIVATE -Wno-psabi)
+endfunction()
+
 # covsplat_test(<name> SOURCES ... DEPS ...): one GoogleTest binary, each test known to CTest.
 function(covsplat_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})

@@ -40,8 +40,9 @@ PoseTable::PoseTable(const ScanMotion& motion, const Eigen::Matrix3d& rotation) 
     }
     const SE3 pose = motion.Within(static_cast<double>(k) / kIntervals - 0.5);
     Entry& entry = entries_[static_cast<std::size_t>(k)];
-    entry.leftCols<3>() = (rotation * pose.RotationMatrix()).cast<float>();
-    entry.col(3) = (rotation * pose.Translation()).cast<float>();
+    entry.setZero();
+    entry.topLeftCorner<3, 3>() = (rotation * pose.RotationMatrix()).cast<float>();
+    entry.topRightCorner<3, 1>() = (rotation * pose.Translation()).cast<float>();
   }
 }
 
@@ -53,8 +54,7 @@ std::vector<Eigen::Vector3f> Deskew(std::span<const Eigen::Vector3f> points,
   if (phase.empty()) return deskewed;
   const PoseTable poses(motion, Eigen::Matrix3d::Identity());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const PoseTable::Pose pose = poses.At(phase[i]);
-    deskewed[i] = pose.rotation * points[i] + pose.translation;
+    deskewed[i] = poses.Move(phase[i], points[i]).head<3>();
   }
   return deskewed;
 }

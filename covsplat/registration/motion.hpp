@@ -66,17 +66,37 @@ class PoseTable {
   PoseTable(const ScanMotion& motion, const Eigen::Matrix3d& rotation);
 
   Pose At(float phase) const {
-    const float position = (phase + 0.5f) * static_cast<float>(kIntervals);
-    const float clamped = std::min(std::max(position, 0.0f), static_cast<float>(kIntervals) - 0.5f);
-    const auto index = static_cast<std::size_t>(clamped);
-    const float fraction = position - static_cast<float>(index);
-    const Entry entry = entries_[index] + fraction * (entries_[index + 1] - entries_[index]);
-    return {entry.leftCols<3>(), entry.col(3)};
+    const Place place = PlaceOf(phase);
+    const Entry entry = entries_[place.index] +
+                        place.fraction * (entries_[place.index + 1] - entries_[place.index]);
+    return {entry.topLeftCorner<3, 3>(), entry.topRightCorner<3, 1>()};
+  }
+
+  /// x y z 0 of a point measured at a phase.
+  Eigen::Vector4f Move(float phase, const Eigen::Vector3f& point) const {
+    const Place place = PlaceOf(phase);
+    const Eigen::Vector4f homogeneous(point.x(), point.y(), point.z(), 1.0f);
+    const Eigen::Vector4f before = entries_[place.index] * homogeneous;
+    const Eigen::Vector4f after = entries_[place.index + 1] * homogeneous;
+    return before + place.fraction * (after - before);
   }
 
  private:
   static constexpr int kIntervals = 256;
-  using Entry = Eigen::Matrix<float, 3, 4>;
+  /// The pose above a row that is not used: columns of four are what processors have vectors for.
+  using Entry = Eigen::Matrix4f;
+  struct Place {
+    std::size_t index;
+    float fraction;
+  };
+
+  static Place PlaceOf(float phase) {
+    const float position = (phase + 0.5f) * static_cast<float>(kIntervals);
+    const float clamped = std::min(std::max(position, 0.0f), static_cast<float>(kIntervals) - 0.5f);
+    const auto index = static_cast<std::size_t>(clamped);
+    return {index, position - static_cast<float>(index)};
+  }
+
   std::array<Entry, kIntervals + 1> entries_;
 };
 

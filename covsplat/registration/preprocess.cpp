@@ -36,7 +36,7 @@ std::vector<int> SelectUsable(const Scan& scan,
   return usable;
 }
 
-VoxelMoments Downsample(std::span<const Eigen::Vector3f> points, const PreprocessConfig& config) {
+VoxelMoments Downsample(std::span<const Eigen::Vector4f> points, const PreprocessConfig& config) {
   constexpr int kMaxHalvings = 2;
   const auto enough = static_cast<std::size_t>(config.min_points);
   auto voxel_m = static_cast<float>(config.downsample_voxel_m);
@@ -75,12 +75,11 @@ SourceCloud Preprocess(const Scan& scan,
   };
   const PoseTable poses(timing.phase.empty() ? ScanMotion{} : predicted,
                         Eigen::Matrix3d::Identity());
-  std::vector<Eigen::Vector3f> deskewed(usable.size());
+  std::vector<Eigen::Vector4f> deskewed(usable.size());
   ParallelFor(pool, usable.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
-      const PoseTable::Pose pose = poses.At(phase_of(usable[k]));
       deskewed[k] =
-          pose.rotation * scan.points[static_cast<std::size_t>(usable[k])] + pose.translation;
+          poses.Move(phase_of(usable[k]), scan.points[static_cast<std::size_t>(usable[k])]);
     }
   });
 

@@ -10,9 +10,10 @@ struct SymmetricEigen {
   Eigen::Matrix3d vectors;  ///< columns, determinant +1
 };
 
-/// Cyclic Jacobi iteration: exact to rounding for repeated and vanishing eigenvalues too. The third
-/// vector is the cross product of the first two, so the columns never form a reflection. Reads the
-/// lower triangle.
+/// In closed form: the eigenvalue that is farthest from the others by trigonometry, its vector,
+/// then one rotation at a right angle to it. Exact to rounding of the largest value, for repeated
+/// and vanishing eigenvalues too. The third vector is the cross product of the first two, so the
+/// columns never form a reflection. Reads the lower triangle.
 SymmetricEigen DecomposeSymmetric(const Eigen::Matrix3d& matrix);
 
 }  // namespace covsplat

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -24,15 +25,13 @@ inline Eigen::Vector3i CellOf(const Eigen::Vector3f& position) {
   return cell;
 }
 
-/// Open-addressing table from cells to small non-negative integers. It never grows: the constructor
-/// is told how many cells there can be. Coordinates beyond +-2^20 share entries with others.
+/// Open-addressing table from cells to small non-negative integers. Small tables are fast ones: it
+/// begins with room for `expected_cells` and grows when they were too few. Coordinates beyond
+/// +-2^20 share entries with others.
 class VoxelHash {
  public:
-  explicit VoxelHash(std::size_t max_cells) {
-    const std::size_t capacity = std::bit_ceil(2 * max_cells + 2);
-    shift_ = 64 - std::countr_zero(capacity);
-    mask_ = capacity - 1;
-    slots_.assign(capacity, Slot{});
+  explicit VoxelHash(std::size_t expected_cells) {
+    Allocate(std::bit_ceil(2 * expected_cells + 2));
   }
 
   /// Value of a cell, -1 if it has none.
@@ -41,9 +40,11 @@ class VoxelHash {
   /// Value of a cell, which becomes `fresh` if it had none.
   int FindOrInsert(const Eigen::Vector3i& cell, int fresh) {
     const std::uint64_t key = Pack(cell);
-    Slot& slot = slots_[Locate(key)];
-    if (slot.value < 0) slot = {key, fresh};
-    return slot.value;
+    const std::size_t at = Locate(key);
+    if (slots_[at].value >= 0) return slots_[at].value;
+    slots_[at] = {key, fresh};
+    if (2 * ++used_ > slots_.size()) Grow();
+    return fresh;
   }
 
  private:
@@ -59,6 +60,20 @@ class VoxelHash {
            (static_cast<std::uint64_t>(cell.z()) & kMask);
   }
 
+  void Allocate(std::size_t capacity) {
+    shift_ = 64 - std::countr_zero(capacity);
+    mask_ = capacity - 1;
+    slots_.assign(capacity, Slot{});
+  }
+
+  void Grow() {
+    const std::vector<Slot> old = std::exchange(slots_, {});
+    Allocate(2 * old.size());
+    for (const Slot& slot : old) {
+      if (slot.value >= 0) slots_[Locate(slot.key)] = slot;
+    }
+  }
+
   std::size_t Locate(std::uint64_t key) const {
     std::size_t index = (key * 0x9E3779B97F4A7C15ULL) >> shift_;
     while (slots_[index].value >= 0 && slots_[index].key != key) index = (index + 1) & mask_;
@@ -67,6 +82,7 @@ class VoxelHash {
 
   int shift_ = 0;
   std::size_t mask_ = 0;
+  std::size_t used_ = 0;
   std::vector<Slot> slots_;
 };
 

@@ -2,11 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
+
+#include <hwy/highway.h>
 
 #include "covsplat/core/check.hpp"
 
 namespace covsplat {
 namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+constexpr hn::FixedTag<float, 4> kFour;
+using Four = hn::Vec<decltype(kFour)>;
 
 // Measurements a voxel may contribute as. Near the sensor voxels hold hundreds of points; without a
 // limit they would pull the fit to the nearest rings.
@@ -14,130 +22,280 @@ constexpr float kCountLimit = 12.0f;
 // A standard deviation across the surface below this is measurement noise.
 constexpr double kFlat_m = 0.04;
 
-Eigen::Matrix3d Unpack(const Eigen::Matrix<float, 6, 1>& v) {
-  Eigen::Matrix3f m;
-  m << v[0], v[1], v[2], v[1], v[3], v[4], v[2], v[4], v[5];
-  return m.cast<double>();
-}
-
-Eigen::Matrix<float, 6, 1> OuterProduct(const Eigen::Vector3f& v) {
-  Eigen::Matrix<float, 6, 1> p;
-  p << v.x() * v.x(), v.x() * v.y(), v.x() * v.z(), v.y() * v.y(), v.y() * v.z(), v.z() * v.z();
-  return p;
-}
-
 // Second variance in relation to the first; below this it is one scan line.
 bool SpansASurface(const SymmetricEigen& eigen) { return eigen.values[1] > 0.03 * eigen.values[0]; }
 
 bool IsFlat(const SymmetricEigen& eigen) { return eigen.values[2] < kFlat_m * kFlat_m; }
 
+SymmetricEigen Decompose(const std::array<float, 4>& square, const std::array<float, 4>& mixed) {
+  Eigen::Matrix3f covariance;
+  covariance << square[0], mixed[0], mixed[2], mixed[0], square[1], mixed[1], mixed[2], mixed[1],
+      square[2];
+  return DecomposeSymmetric(covariance.cast<double>());
+}
+
+// Moments of positions x y z x: of such a vector, its product with itself turned by one lane is
+// xy yz zx.
+struct Moments {
+  Four mean = hn::Zero(kFour);
+  Four square = hn::Zero(kFour);
+  Four mixed = hn::Zero(kFour);
+
+  HWY_INLINE void Add(Four position) {
+    mean = hn::Add(mean, position);
+    square = hn::MulAdd(position, position, square);
+    mixed = hn::MulAdd(position, hn::Shuffle0321(position), mixed);
+  }
+
+  // Of sums to means, with squares about the mean.
+  HWY_INLINE void Normalize(float weight) {
+    const Four share = hn::Set(kFour, 1.0f / weight);
+    mean = hn::Mul(mean, share);
+    square = hn::Sub(hn::Mul(square, share), hn::Mul(mean, mean));
+    mixed = hn::Sub(hn::Mul(mixed, share), hn::Mul(mean, hn::Shuffle0321(mean)));
+  }
+};
+
+// x y z x of a point.
+HWY_INLINE Four LoadPosition(const Eigen::Vector4f& point) {
+  const Four xyz = hn::LoadU(kFour, point.data());
+  return hn::IfThenElse(hn::FirstN(kFour, 3), xyz, hn::Shuffle0321(xyz));
+}
+
+// x y z x.
+HWY_INLINE Four Position(float x, float y, float z) {
+  alignas(16) const std::array<float, 4> lanes = {x, y, z, x};
+  return hn::Load(kFour, lanes.data());
+}
+
+// Sum of the first three lanes.
+HWY_INLINE float SumXyz(Four v) {
+  return hn::GetLane(hn::Add(hn::Add(v, hn::Shuffle2301(v)), hn::Shuffle1032(v)));
+}
+
+// Of the cell of a position in cells. Far positions and NaN are clamped, as by CellOf.
+HWY_INLINE Four FloorWithinLimits(Four position) {
+  constexpr float kLimit = 1048575.0f;
+  const Four above = hn::Max(position, hn::Set(kFour, -kLimit));
+  return hn::Floor(hn::Min(above, hn::Set(kFour, kLimit)));
+}
+
+HWY_INLINE Eigen::Vector3i CellAt(Four floor) {
+  constexpr hn::FixedTag<std::int32_t, 4> kInts;
+  alignas(16) std::array<std::int32_t, 4> cell;
+  hn::Store(hn::ConvertTo(kInts, floor), kInts, cell.data());
+  return {cell[0], cell[1], cell[2]};
+}
+
 }  // namespace
 
-// Through a point relative to the central voxel's centre.
+// Through a point, both relative to the central voxel's centre.
 struct VoxelMoments::Plane {
-  Eigen::Vector3f normal;
-  Eigen::Vector3f point;
+  Four normal;
+  Four point;
 
-  float WeightOf(const Eigen::Vector3f& position) const {
+  HWY_INLINE float WeightOf(Four position) const {
     constexpr float kWidth = 0.05f;  // m
-    const float distance = normal.dot(position - point) / kWidth;
+    const float distance = SumXyz(hn::Mul(normal, hn::Sub(position, point))) / kWidth;
     const float fading = 1.0f / (1.0f + distance * distance);
     return fading * fading;
   }
 };
 
-// Sums are relative to the central voxel's centre.
-struct VoxelMoments::Neighbourhood {
-  float measurements = 0.0f;
-  int voxels = 0;
-  float weight = 0.0f;
-  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-  Packed squares = Packed::Zero();
-
-  SymmetricEigen Decompose() const {
-    const Eigen::Vector3f mean = sum / weight;
-    return DecomposeSymmetric(Unpack(squares / weight - OuterProduct(mean)));
+// Sums over voxels, from the central voxel's centre.
+class VoxelMoments::Neighbourhood {
+ public:
+  // `mean`: of the voxel.
+  HWY_INLINE void Add(const Voxel& voxel, Four mean, float share) {
+    const float weight = share * std::min(voxel.Count(), kCountLimit);
+    const Four weights = hn::Set(kFour, weight);
+    const Four square = hn::MulAdd(mean, mean, hn::Load(kFour, voxel.square.data()));
+    const Four mixed = hn::MulAdd(mean, hn::Shuffle0321(mean), hn::Load(kFour, voxel.mixed.data()));
+    measurements_ += voxel.Count();
+    ++voxels_;
+    weight_ += weight;
+    sums_.mean = hn::MulAdd(weights, mean, sums_.mean);
+    sums_.square = hn::MulAdd(weights, square, sums_.square);
+    sums_.mixed = hn::MulAdd(weights, mixed, sums_.mixed);
   }
+
+  float Measurements() const { return measurements_; }
+  int Voxels() const { return voxels_; }
+
+  SymmetricEigen Decomposed() const {
+    Moments moments = sums_;
+    moments.Normalize(weight_);
+    alignas(16) std::array<float, 4> square;
+    alignas(16) std::array<float, 4> mixed;
+    hn::Store(moments.square, kFour, square.data());
+    hn::Store(moments.mixed, kFour, mixed.data());
+    return Decompose(square, mixed);
+  }
+
+ private:
+  float measurements_ = 0.0f;
+  int voxels_ = 0;
+  float weight_ = 0.0f;
+  Moments sums_;
 };
 
-VoxelMoments::VoxelMoments(std::span<const Eigen::Vector3f> points, float voxel_m)
-    : voxel_m_(voxel_m), cells_(points.size()) {
+VoxelMoments::VoxelMoments(std::span<const Eigen::Vector4f> points, float voxel_m)
+    : voxel_m_(voxel_m), columns_(0) {
   COVSPLAT_CHECK(voxel_m > 0.0f);
-  voxels_.reserve(points.size() / 4);
-  const float voxels_per_m = 1.0f / voxel_m;
+  Collect(points);
+  SortIntoColumns();
+}
+
+void VoxelMoments::Collect(std::span<const Eigen::Vector4f> points) {
+  struct Tally {
+    Moments sums;
+    float count = 0.0f;
+    float nearest = std::numeric_limits<float>::infinity();  // squared, to the voxel's centre
+  };
+  const std::size_t expected = points.size() / 8;
+  VoxelHash cells(expected);
+  std::vector<Tally> tallies;  // [voxels]
+  voxels_.reserve(expected);
+  tallies.reserve(expected);
+  const Four edge = hn::Set(kFour, voxel_m_);
+  const Four per_m = hn::Set(kFour, 1.0f / voxel_m_);
+  const Four half = hn::Set(kFour, 0.5f);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3i cell = CellOf(points[i] * voxels_per_m);
-    const int at = cells_.FindOrInsert(cell, static_cast<int>(voxels_.size()));
-    if (at == static_cast<int>(voxels_.size())) voxels_.push_back({.cell = cell});
-    Add(voxels_[static_cast<std::size_t>(at)], points[i], static_cast<int>(i));
+    const Four position = LoadPosition(points[i]);
+    const Four low = FloorWithinLimits(hn::Mul(position, per_m));
+    const Eigen::Vector3i cell = CellAt(low);
+    const auto at =
+        static_cast<std::size_t>(cells.FindOrInsert(cell, static_cast<int>(voxels_.size())));
+    if (at == voxels_.size()) {
+      voxels_.push_back({.cell = cell});
+      tallies.emplace_back();
+    }
+    Tally& tally = tallies[at];
+    const Four offset = hn::Sub(position, hn::Mul(hn::Add(low, half), edge));
+    tally.sums.Add(offset);
+    tally.count += 1.0f;
+    const float squared = SumXyz(hn::Mul(offset, offset));
+    if (squared >= tally.nearest) continue;
+    tally.nearest = squared;
+    voxels_[at].representative = static_cast<int>(i);
   }
-  for (Voxel& voxel : voxels_) {
-    voxel.mean /= voxel.count;
-    voxel.spread = voxel.spread / voxel.count - OuterProduct(voxel.mean);
+  for (std::size_t v = 0; v < voxels_.size(); ++v) {
+    Tally& tally = tallies[v];
+    tally.sums.Normalize(tally.count);
+    hn::Store(tally.sums.mean, kFour, voxels_[v].mean.data());
+    hn::Store(tally.sums.square, kFour, voxels_[v].square.data());
+    hn::Store(tally.sums.mixed, kFour, voxels_[v].mixed.data());
+    voxels_[v].square[3] = tally.count;
   }
 }
 
-void VoxelMoments::Add(Voxel& voxel, const Eigen::Vector3f& point, int index) const {
-  const Eigen::Vector3f offset =
-      point - (voxel.cell.cast<float>().array() + 0.5f).matrix() * voxel_m_;
-  voxel.count += 1.0f;
-  voxel.mean += offset;
-  voxel.spread += OuterProduct(offset);
-  const float squared = offset.squaredNorm();
-  if (voxel.representative >= 0 && squared >= voxel.squared_to_centre) return;
-  voxel.representative = index;
-  voxel.squared_to_centre = squared;
+void VoxelMoments::SortIntoColumns() {
+  columns_ = VoxelHash(voxels_.size() / 2);
+  std::vector<std::uint32_t> column(voxels_.size());
+  column_begin_.assign(1, 0);  // counts, shifted by one, until they are summed up
+  for (std::size_t i = 0; i < voxels_.size(); ++i) {
+    const Eigen::Vector3i& cell = voxels_[i].cell;
+    const auto fresh = static_cast<std::uint32_t>(column_begin_.size() - 1);
+    column[i] = static_cast<std::uint32_t>(
+        columns_.FindOrInsert({cell.x(), cell.y(), 0}, static_cast<int>(fresh)));
+    if (column[i] == fresh) column_begin_.push_back(0);
+    ++column_begin_[column[i] + 1];
+  }
+  for (std::size_t c = 1; c < column_begin_.size(); ++c) column_begin_[c] += column_begin_[c - 1];
+
+  std::vector<std::uint32_t> order(voxels_.size());
+  std::vector<std::uint32_t> next(column_begin_.begin(), column_begin_.end() - 1);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    order[next[column[i]]++] = static_cast<std::uint32_t>(i);
+  }
+  for (std::size_t c = 0; c + 1 < column_begin_.size(); ++c) {
+    std::sort(order.begin() + column_begin_[c],
+              order.begin() + column_begin_[c + 1],
+              [&](std::uint32_t a, std::uint32_t b) {
+                return voxels_[a].cell.z() < voxels_[b].cell.z();
+              });
+  }
+  std::vector<Voxel> sorted;
+  sorted.reserve(order.size());
+  place_.resize(order.size());
+  for (const std::uint32_t i : order) {
+    place_[i] = static_cast<std::uint32_t>(sorted.size());
+    sorted.push_back(voxels_[i]);
+  }
+  voxels_ = std::move(sorted);
 }
 
-VoxelMoments::Neighbourhood VoxelMoments::Gather(const Voxel& centre,
-                                                 int radius,
-                                                 const Plane* plane) const {
-  Neighbourhood merged;
+/// Visits the voxels that are farther than `hole` and no farther than `radius` along some axis,
+/// with the mean of each from the centre.
+template <class Visit>
+HWY_INLINE void VoxelMoments::ForEachAround(const Voxel& centre,
+                                            int hole,
+                                            int radius,
+                                            Visit&& visit) const {
+  const Four right = Position(voxel_m_, 0.0f, 0.0f);
+  const Four ahead = Position(0.0f, voxel_m_, 0.0f);
+  const Four up = Position(0.0f, 0.0f, voxel_m_);
+  const auto times = [](Four v, int n) {
+    return hn::Mul(v, hn::Set(kFour, static_cast<float>(n)));
+  };
   for (int dx = -radius; dx <= radius; ++dx) {
     for (int dy = -radius; dy <= radius; ++dy) {
-      for (int dz = -radius; dz <= radius; ++dz) {
-        const Eigen::Vector3i shift(dx, dy, dz);
-        const int at = cells_.Find(centre.cell + shift);
-        if (at < 0) continue;
-        const Voxel& voxel = voxels_[static_cast<std::size_t>(at)];
-        const Eigen::Vector3f mean = voxel.mean + shift.cast<float>() * voxel_m_;
-        float weight = std::min(voxel.count, kCountLimit);
-        if (plane != nullptr) weight *= plane->WeightOf(mean);
-        merged.measurements += voxel.count;
-        ++merged.voxels;
-        merged.weight += weight;
-        merged.sum += weight * mean;
-        merged.squares += weight * (voxel.spread + OuterProduct(mean));
+      const int column = columns_.Find({centre.cell.x() + dx, centre.cell.y() + dy, 0});
+      if (column < 0) continue;
+      const bool in_hole = std::max(std::abs(dx), std::abs(dy)) <= hole;
+      const Four aside = hn::Add(times(right, dx), times(ahead, dy));
+      const Voxel* voxel = &voxels_[column_begin_[static_cast<std::size_t>(column)]];
+      const Voxel* end = voxels_.data() + column_begin_[static_cast<std::size_t>(column) + 1];
+      for (; voxel != end; ++voxel) {
+        const int dz = voxel->cell.z() - centre.cell.z();
+        if (dz > radius) break;
+        if (dz < -radius || (in_hole && std::abs(dz) <= hole)) continue;
+        const Four shift = hn::Add(aside, times(up, dz));
+        visit(*voxel, hn::Add(hn::Load(kFour, voxel->mean.data()), shift));
       }
     }
   }
-  return merged;
+}
+
+/// Of the voxels around one, those off a plane fade out; twice, as they tell the plane better.
+SymmetricEigen VoxelMoments::AlongPlane(const Voxel& centre,
+                                        int radius,
+                                        Eigen::Vector3f normal) const {
+  SymmetricEigen surface;
+  for (int pass = 0; pass < 2; ++pass) {
+    const Plane plane{Position(normal.x(), normal.y(), normal.z()),
+                      hn::Load(kFour, centre.mean.data())};
+    Neighbourhood sums;
+    ForEachAround(centre, -1, radius, [&](const Voxel& voxel, Four mean) {
+      sums.Add(voxel, mean, plane.WeightOf(mean));
+    });
+    surface = sums.Decomposed();
+    normal = surface.vectors.col(2).cast<float>();
+  }
+  return surface;
 }
 
 SymmetricEigen VoxelMoments::SurfaceAround(std::size_t voxel, int min_points) const {
   constexpr int kMinVoxels = 4;
   constexpr float kMinOwnPoints = 6.0f;
-  const Voxel& centre = voxels_[voxel];
+  const Voxel& centre = At(voxel);
+  Neighbourhood merged;
   SymmetricEigen surface;
   int radius = 1;
   for (;; ++radius) {
-    const Neighbourhood merged = Gather(centre, radius, nullptr);
-    surface = merged.Decompose();
-    if (radius == kMaxRadius) break;
-    if (merged.measurements < static_cast<float>(min_points) || merged.voxels < kMinVoxels) {
-      continue;
-    }
-    if (SpansASurface(surface)) break;
+    ForEachAround(centre, radius == 1 ? -1 : radius - 1, radius, [&](const Voxel& v, Four mean) {
+      merged.Add(v, mean, 1.0f);
+    });
+    const bool is_enough =
+        merged.Measurements() >= static_cast<float>(min_points) && merged.Voxels() >= kMinVoxels;
+    if (!is_enough && radius < kMaxRadius) continue;
+    surface = merged.Decomposed();
+    if (radius == kMaxRadius || SpansASurface(surface)) break;
   }
-  if (IsFlat(surface) || centre.count < kMinOwnPoints) return surface;
-  const SymmetricEigen own = DecomposeSymmetric(Unpack(centre.spread));
+  if (IsFlat(surface) || centre.Count() < kMinOwnPoints) return surface;
+  const SymmetricEigen own = Decompose(centre.square, centre.mixed);
   if (!IsFlat(own) || !SpansASurface(own)) return surface;
-  Plane plane{own.vectors.col(2).cast<float>(), centre.mean};
-  for (int pass = 0; pass < 2; ++pass) {
-    surface = Gather(centre, radius, &plane).Decompose();
-    plane.normal = surface.vectors.col(2).cast<float>();
-  }
-  return surface;
+  return AlongPlane(centre, radius, own.vectors.col(2).cast<float>());
 }
 
 }  // namespace covsplat
