@@ -66,10 +66,14 @@ class PoseTable {
   PoseTable(const ScanMotion& motion, const Eigen::Matrix3d& rotation);
 
   Pose At(float phase) const {
+    const Eigen::Matrix4f matrix = MatrixAt(phase);
+    return {matrix.topLeftCorner<3, 3>(), matrix.topRightCorner<3, 1>()};
+  }
+  /// Rotation and translation above a row of zeros.
+  Eigen::Matrix4f MatrixAt(float phase) const {
     const Place place = PlaceOf(phase);
-    const Entry entry = entries_[place.index] +
-                        place.fraction * (entries_[place.index + 1] - entries_[place.index]);
-    return {entry.topLeftCorner<3, 3>(), entry.topRightCorner<3, 1>()};
+    return entries_[place.index] +
+           place.fraction * (entries_[place.index + 1] - entries_[place.index]);
   }
 
   /// x y z 0 of a point measured at a phase.

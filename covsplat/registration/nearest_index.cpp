@@ -1,12 +1,31 @@
 #include "covsplat/registration/nearest_index.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+
+#include <hwy/highway.h>
 
 #include "covsplat/core/check.hpp"
 
 namespace covsplat {
 namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+constexpr hn::FixedTag<float, 4> kFour;
+using Four = hn::Vec<decltype(kFour)>;
+constexpr int kLanes = 4;
+
+// Of four points in a row from a position.
+HWY_INLINE Four SquaredDistances(const float* x,
+                                 const float* y,
+                                 const float* z,
+                                 const Eigen::Vector3f& query) {
+  const Four dx = hn::Sub(hn::LoadU(kFour, x), hn::Set(kFour, query.x()));
+  const Four dy = hn::Sub(hn::LoadU(kFour, y), hn::Set(kFour, query.y()));
+  const Four dz = hn::Sub(hn::LoadU(kFour, z), hn::Set(kFour, query.z()));
+  return hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
+}
 
 // Squared distance between a cell's box and a position, both in cells.
 float SquaredGap(const Eigen::Vector3f& position, int x, int y, int z) {
@@ -37,32 +56,44 @@ NearestIndex::NearestIndex(std::span<const Eigen::Vector3f> points, float cell_m
   for (std::size_t c = 1; c < begin_.size(); ++c) begin_[c] += begin_[c - 1];
 
   order_.resize(n);
-  points_.resize(n);
+  for (std::vector<float>* axis : {&x_, &y_, &z_}) axis->resize(n + kLanes - 1);
   std::vector<int> next(begin_.begin(), begin_.end() - 1);
   for (std::size_t i = 0; i < n; ++i) {
     const auto slot = static_cast<std::size_t>(next[static_cast<std::size_t>(cell_of[i])]++);
     order_[slot] = static_cast<int>(i);
-    points_[slot] = points[i];
+    x_[slot] = points[i].x();
+    y_[slot] = points[i].y();
+    z_[slot] = points[i].z();
   }
 }
 
+// Four points at a time; few are nearer than what was found before.
 void NearestIndex::ScanCell(const Eigen::Vector3i& cell, Search& search) const {
   const int position = cells_.Find(cell);
   if (position < 0) return;
   const int end = begin_[static_cast<std::size_t>(position) + 1];
-  for (int slot = begin_[static_cast<std::size_t>(position)]; slot < end; ++slot) {
-    const Eigen::Vector3f offset = points_[static_cast<std::size_t>(slot)] - search.query;
-    const float squared = offset.squaredNorm();
-    if (!(squared < search.second_squared) || slot == search.slot) continue;
-    const bool tie =
-        squared == search.squared && search.slot >= 0 && IndexOf(slot) < IndexOf(search.slot);
-    if (squared < search.squared || tie) {
-      if (search.slot >= 0) search.second_squared = search.squared;
-      search.squared = squared;
-      search.slot = slot;
-    } else {
-      search.second_squared = squared;
-    }
+  for (int slot = begin_[static_cast<std::size_t>(position)]; slot < end; slot += kLanes) {
+    const auto at = static_cast<std::size_t>(slot);
+    const Four squared = SquaredDistances(&x_[at], &y_[at], &z_[at], search.query);
+    const auto nearer = hn::Lt(squared, hn::Set(kFour, search.second_squared));
+    if (hn::AllFalse(kFour, nearer)) continue;
+    alignas(16) std::array<float, kLanes> lanes;
+    hn::Store(squared, kFour, lanes.data());
+    const int count = std::min(kLanes, end - slot);
+    for (int k = 0; k < count; ++k) Consider(slot + k, lanes[static_cast<std::size_t>(k)], search);
+  }
+}
+
+void NearestIndex::Consider(int slot, float squared, Search& search) const {
+  if (!(squared < search.second_squared) || slot == search.slot) return;
+  const bool tie =
+      squared == search.squared && search.slot >= 0 && IndexOf(slot) < IndexOf(search.slot);
+  if (squared < search.squared || tie) {
+    if (search.slot >= 0) search.second_squared = search.squared;
+    search.squared = squared;
+    search.slot = slot;
+  } else {
+    search.second_squared = squared;
   }
 }
 
@@ -73,7 +104,8 @@ NearestIndex::Match NearestIndex::Nearest(const Eigen::Vector3f& query,
   constexpr float kSlack = 1.0001f;  // covers rounding
   Search search{.query = query, .squared = max_squared};
   if (hint >= 0) {
-    const float squared = (points_[static_cast<std::size_t>(hint)] - query).squaredNorm();
+    const auto at = static_cast<std::size_t>(hint);
+    const float squared = hn::GetLane(SquaredDistances(&x_[at], &y_[at], &z_[at], query));
     if (squared < max_squared) {
       search.squared = squared;
       search.slot = hint;

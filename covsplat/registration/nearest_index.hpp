@@ -64,13 +64,14 @@ class NearestIndex {
     float second_squared = std::numeric_limits<float>::infinity();
   };
   void ScanCell(const Eigen::Vector3i& cell, Search& search) const;
+  void Consider(int slot, float squared, Search& search) const;
 
   float cell_m_;
   float cells_per_m_;
-  VoxelHash cells_;                      // cell -> position in begin_
-  std::vector<int> begin_;               // [cells + 1], first slot of each cell
-  std::vector<int> order_;               // [N], slot -> original index
-  std::vector<Eigen::Vector3f> points_;  // [N], by slot
+  VoxelHash cells_;               // cell -> position in begin_
+  std::vector<int> begin_;        // [cells + 1], first slot of each cell
+  std::vector<int> order_;        // [N], slot -> original index
+  std::vector<float> x_, y_, z_;  // by slot, and room to read a few beyond the last
 };
 
 }  // namespace covsplat

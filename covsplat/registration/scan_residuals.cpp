@@ -11,54 +11,30 @@ namespace {
 
 constexpr std::size_t kGrain = 512;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-/// Cosine of the angle between the normals of the two sides of a wall, and less.
-constexpr float kOpposite = -0.9f;
 
-using Packed3 = Eigen::Matrix<float, 6, 1>;  // xx xy xz yy yz zz
-
-Eigen::Matrix3f Unpack(const Packed3& v) {
-  Eigen::Matrix3f m;
-  m << v[0], v[1], v[2], v[1], v[3], v[4], v[2], v[4], v[5];
-  return m;
+double Sum(const MatchSums::Lanes& lanes) {
+  return Eigen::Map<const Eigen::Array<float, MatchBatch::kSize, 1>>(lanes.data())
+      .cast<double>()
+      .sum();
 }
 
-// Inverse of a symmetric positive definite matrix by cofactors.
-Eigen::Matrix3f InvertSymmetric(const Eigen::Matrix3f& c) {
-  const float xx = c(1, 1) * c(2, 2) - c(1, 2) * c(1, 2);
-  const float xy = c(0, 2) * c(1, 2) - c(0, 1) * c(2, 2);
-  const float xz = c(0, 1) * c(1, 2) - c(0, 2) * c(1, 1);
-  const float yy = c(0, 0) * c(2, 2) - c(0, 2) * c(0, 2);
-  const float yz = c(0, 1) * c(0, 2) - c(0, 0) * c(1, 2);
-  const float zz = c(0, 0) * c(1, 1) - c(0, 1) * c(0, 1);
-  const float inverse = 1.0f / (c(0, 0) * xx + c(0, 1) * xy + c(0, 2) * xz);
-  Packed3 packed;
-  packed << xx, xy, xz, yy, yz, zz;
-  return Unpack(packed * inverse);
-}
-
-// J^T M J (upper triangle by rows) and J^T M e for e = mean - (lever + omega x lever + v).
-Eigen::Matrix<float, 27, 1> PackTerms(const Eigen::Vector3f& lever,
-                                      const Eigen::Matrix3f& m,
-                                      const Eigen::Vector3f& m_e) {
-  // With G = Skew(lever), J = [G, -I]: J^T M J = [G^T M G, -G^T M; ., M].
-  Eigen::Matrix3f gm;  // -G^T M = Skew(lever) M
-  for (int k = 0; k < 3; ++k) gm.col(k) = lever.cross(m.col(k));
-  Eigen::Matrix3f gmg;  // G^T M G: rows of Skew(lever) M crossed with the lever
-  for (int k = 0; k < 3; ++k) gmg.row(k) = lever.cross(gm.row(k).transpose()).transpose();
-  const Eigen::Vector3f torque = -lever.cross(m_e);
-  Eigen::Matrix<float, 27, 1> v;
-  v << gmg(0, 0), gmg(0, 1), gmg(0, 2), gm(0, 0), gm(0, 1), gm(0, 2),  //
-      gmg(1, 1), gmg(1, 2), gm(1, 0), gm(1, 1), gm(1, 2),              //
-      gmg(2, 2), gm(2, 0), gm(2, 1), gm(2, 2),                         //
-      m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2),            //
-      torque, -m_e;
-  return v;
-}
-
-Eigen::Matrix<float, 10, 1> LeverTerms(const Eigen::Vector3f& lever) {
-  Eigen::Matrix<float, 10, 1> v;
-  v << 1.0f, lever, lever.x() * lever, lever.y() * lever.tail<2>(), lever.z() * lever.z();
-  return v;
+PhaseMoments MomentsOf(const MatchSums& sums) {
+  PhaseMoments moments;
+  for (std::size_t k = 0; k < PhaseMoments::kMoments; ++k) {
+    for (std::size_t i = 0; i < MatchSums::kTerms; ++i) {
+      moments.moment[k][static_cast<int>(i)] = Sum(sums.moment[k][i]);
+    }
+  }
+  for (std::size_t i = 0; i < MatchSums::kLeverTerms; ++i) {
+    moments.lever[static_cast<int>(i)] = Sum(sums.lever[i]);
+  }
+  moments.weighted_square = Sum(sums.weighted_square);
+  moments.kernel_sum = Sum(sums.kernel_sum);
+  moments.kernel_square_sum = Sum(sums.kernel_square_sum);
+  moments.plane_square = Sum(sums.plane_square);
+  moments.matches = static_cast<std::size_t>(Sum(sums.matches));
+  moments.inliers = static_cast<std::size_t>(Sum(sums.inliers));
+  return moments;
 }
 
 }  // namespace
@@ -124,9 +100,8 @@ NormalEquations Assemble(const PhaseMoments& moments, const ScanMotion& motion) 
 
 /// What a chunk needs to know of the motion.
 struct ScanResiduals::Frame {
-  PoseTable poses;         ///< R_map_s and the lever's offset, axes of the map about the sensor
-  Eigen::Vector3f sensor;  ///< position at mid scan relative to the target's origin
-  float inverse_kernel_scale;
+  PoseTable poses;  ///< to the axes of the map, about the sensor at mid scan
+  MatchSettings settings;
   std::size_t stride;
 };
 
@@ -136,12 +111,11 @@ ScanResiduals::ScanResiduals(const SourceCloud& source,
                              double inlier_distance_m,
                              bool same_side,
                              ThreadPool& pool)
-    : source_(source),
-      target_(target),
+    : target_(target),
       squared_gate_(static_cast<float>(gate_m * gate_m)),
       inlier_distance_m_(static_cast<float>(inlier_distance_m)),
       same_side_(same_side),
-      covariance_(source.Size()),
+      source_(source.Size()),
       slot_(source.Size(), -1),
       squared_distance_(source.Size(), kInfinity),
       searched_(source.Size(), Eigen::Vector3f::Constant(kInfinity)),
@@ -152,7 +126,10 @@ ScanResiduals::ScanResiduals(const SourceCloud& source,
   ParallelFor(pool, source.Size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const PointCovariance& c = source.covariance[i];
-      covariance_[i] = SurfaceCovariance(c.axes, c.sigma_m[0], c.sigma_m[1]);
+      source_[i] = {.point = source.points[i],
+                    .phase = source.phase[i],
+                    .covariance = SurfaceCovariance(c.axes, c.sigma_m[0], c.sigma_m[1]),
+                    .normal = c.axes.col(2)};
     }
   });
 }
@@ -162,13 +139,14 @@ PhaseMoments ScanResiduals::Evaluate(const ScanMotion& motion,
                                      std::size_t stride,
                                      ThreadPool& pool) {
   const SE3& pose = motion.T_map_sensor;
-  const Frame frame{PoseTable(motion, pose.RotationMatrix()),
-                    (pose.Translation() - target_.OriginMap()).cast<float>(),
-                    static_cast<float>(1.0 / kernel_scale),
-                    stride};
+  const MatchSettings settings{.sensor = (pose.Translation() - target_.OriginMap()).cast<float>(),
+                               .inverse_kernel_scale = static_cast<float>(1.0 / kernel_scale),
+                               .inlier_distance_m = inlier_distance_m_,
+                               .same_side = same_side_};
+  const Frame frame{PoseTable(motion, pose.RotationMatrix()), settings, stride};
   return ParallelSum(
       pool,
-      (source_.Size() + stride - 1) / stride,
+      (Size() + stride - 1) / stride,
       kGrain,
       PhaseMoments(),
       [&](std::size_t begin, std::size_t end) { return SumChunk(frame, begin, end); });
@@ -196,51 +174,30 @@ void ScanResiduals::Match(std::size_t i, const Eigen::Vector3f& position) {
 }
 
 PhaseMoments ScanResiduals::SumChunk(const Frame& frame, std::size_t begin, std::size_t end) {
-  PhaseMoments sums;
+  MatchSums sums;
+  MatchBatch batch;
+  const auto sum_up = [&] {
+    MatchSums::Lanes mahalanobis;
+    SumMatches(batch, frame.settings, sums, mahalanobis);
+    for (std::size_t k = 0; k < batch.Size(); ++k) {
+      mahalanobis_[batch.IndexOf(k)] = mahalanobis[k];
+    }
+    batch.Clear();
+  };
   for (std::size_t k = begin; k < end; ++k) {
     const std::size_t i = k * frame.stride;
-    const PoseTable::Pose pose = frame.poses.At(source_.phase[i]);
-    const Eigen::Vector3f lever = pose.rotation * source_.points[i] + pose.translation;
-    const Eigen::Vector3f position = lever + frame.sensor;
-    Match(i, position);
+    const Eigen::Matrix4f pose = frame.poses.MatrixAt(source_[i].phase);
+    const Eigen::Vector4f lever = pose * source_[i].point.homogeneous();
+    Match(i, lever.head<3>() + frame.settings.sensor);
     if (slot_[i] < 0) {
       mahalanobis_[i] = kInfinity;
       continue;
     }
-    const RegistrationTarget::Record& surfel = target_.At(slot_[i]);
-    if (same_side_) {
-      const Eigen::Vector3f normal = pose.rotation * source_.covariance[i].axes.col(2);
-      if (normal.dot(surfel.normal) <= kOpposite) {
-        mahalanobis_[i] = kInfinity;
-        continue;
-      }
-    }
-    const Eigen::Vector3f e = surfel.mean - position;
-    const Eigen::Matrix3f c = Unpack(surfel.covariance) +
-                              pose.rotation * Unpack(covariance_[i]) * pose.rotation.transpose();
-    const Eigen::Matrix3f m = InvertSymmetric(c);
-    const Eigen::Vector3f m_e = m * e;
-    const float square = std::max(e.dot(m_e), 0.0f);
-    mahalanobis_[i] = square;
-    const double kernel = 1.0f / (1.0f + square * frame.inverse_kernel_scale);
-    const double weight = kernel * surfel.weight;
-    const float plane = surfel.normal.dot(e);
-
-    const Eigen::Matrix<double, 27, 1> terms = PackTerms(lever, m, m_e).cast<double>();
-    double power = weight;
-    for (auto& moment : sums.moment) {
-      moment += power * terms;
-      power *= static_cast<double>(source_.phase[i]);
-    }
-    sums.lever += weight * (m.trace() * LeverTerms(lever)).cast<double>();
-    sums.weighted_square += weight * static_cast<double>(square);
-    sums.kernel_sum += kernel;
-    sums.kernel_square_sum += kernel * kernel;
-    sums.plane_square += kernel * kernel * static_cast<double>(plane * plane);
-    ++sums.matches;
-    sums.inliers += std::abs(plane) < inlier_distance_m_ ? 1 : 0;
+    batch.Add(i, source_[i], target_.At(slot_[i]), pose);
+    if (batch.IsFull()) sum_up();
   }
-  return sums;
+  if (batch.Size() > 0) sum_up();
+  return MomentsOf(sums);
 }
 
 double ScanResiduals::MedianSquare() {

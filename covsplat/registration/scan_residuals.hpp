@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "covsplat/core/parallel.hpp"
+#include "covsplat/registration/match_sums.hpp"
 #include "covsplat/registration/motion.hpp"
 #include "covsplat/registration/preprocess.hpp"
 #include "covsplat/registration/target.hpp"
@@ -82,17 +83,16 @@ class ScanResiduals {
   void Match(std::size_t i, const Eigen::Vector3f& position);
   PhaseMoments SumChunk(const Frame& frame, std::size_t begin, std::size_t end);
 
-  const SourceCloud& source_;
   const RegistrationTarget& target_;
   const float squared_gate_;
   const float inlier_distance_m_;
   const bool same_side_;
-  std::vector<Eigen::Matrix<float, 6, 1>> covariance_;  // [N] sensor frame at the point's time
-  std::vector<int> slot_;                               // [N] nearest surfel, -1 if none
-  std::vector<float> squared_distance_;                 // [N]
-  std::vector<Eigen::Vector3f> searched_;               // [N] position at the last search
-  std::vector<float> clearance_m_;                      // [N] of the last search
-  std::vector<float> mahalanobis_;                      // [N] e^T M e
+  std::vector<SourceRecord> source_;       // [N]
+  std::vector<int> slot_;                  // [N] nearest surfel, -1 if none
+  std::vector<float> squared_distance_;    // [N]
+  std::vector<Eigen::Vector3f> searched_;  // [N] position at the last search
+  std::vector<float> clearance_m_;         // [N] of the last search
+  std::vector<float> mahalanobis_;         // [N] e^T M e
   std::vector<float> scratch_;
 };
 

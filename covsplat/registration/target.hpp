@@ -39,7 +39,7 @@ class RegistrationTarget {
   RegistrationTarget(std::span<const TargetSurfel> surfels,
                      const Eigen::Vector3d& origin_map,
                      int keyframes,
-                     double cell_m = 0.75);
+                     double cell_m = 1.0);
 
   std::size_t Size() const { return records_.size(); }
   const Eigen::Vector3d& OriginMap() const { return origin_map_; }

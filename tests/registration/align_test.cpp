@@ -67,7 +67,7 @@ TEST(Align, DoesNotDependOnTheScaleOfTheWeights) {
   const SourceCloud cloud = StillCloud(Room(), SE3(), 0.02, 1, pool);
   const SourceCloud source = StillCloud(Room(), kTruth, 0.02, 2, pool);
   const AlignResult one = Align(source, TargetFrom(cloud), At(SE3()), GicpConfig{}, pool);
-  const AlignResult other = Align(source, TargetFrom(cloud, 7.3f), At(SE3()), GicpConfig{}, pool);
+  const AlignResult other = Align(source, TargetFrom(cloud, 8.0f), At(SE3()), GicpConfig{}, pool);
   EXPECT_LT(RotationError(one.motion.T_map_sensor, other.motion.T_map_sensor), 1e-9);
   EXPECT_LT(TranslationError(one.motion.T_map_sensor, other.motion.T_map_sensor), 1e-9);
   EXPECT_NEAR(one.information(4, 4) / other.information(4, 4), 1.0, 1e-5);

@@ -10,7 +10,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "covsplat/splat/cpu/simd16-inl.hpp"
+#include "covsplat/core/simd16-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace covsplat::HWY_NAMESPACE {

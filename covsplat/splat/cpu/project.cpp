@@ -9,7 +9,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "covsplat/splat/cpu/simd16-inl.hpp"
+#include "covsplat/core/simd16-inl.hpp"
 
 #ifndef COVSPLAT_SPLAT_CPU_PROJECT_ONCE
 #define COVSPLAT_SPLAT_CPU_PROJECT_ONCE

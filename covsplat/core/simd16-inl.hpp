@@ -1,13 +1,13 @@
-// Packs of 16 scalars, one for each pixel of a 4x4 tile or each Gaussian of a block, in as many
-// vectors as the instruction set needs. Included once per target, as Highway's own -inl headers
-// are.
+// Packs of 16 scalars, one for each pixel of a 4x4 tile, Gaussian of a block or match of a batch,
+// in as many vectors as the instruction set needs. Included once per target, as Highway's own -inl
+// headers are.
 
 // clang-format off
-#if defined(COVSPLAT_SPLAT_CPU_SIMD16_INL_HPP_) == defined(HWY_TARGET_TOGGLE)
-#ifdef COVSPLAT_SPLAT_CPU_SIMD16_INL_HPP_
-#undef COVSPLAT_SPLAT_CPU_SIMD16_INL_HPP_
+#if defined(COVSPLAT_CORE_SIMD16_INL_HPP_) == defined(HWY_TARGET_TOGGLE)
+#ifdef COVSPLAT_CORE_SIMD16_INL_HPP_
+#undef COVSPLAT_CORE_SIMD16_INL_HPP_
 #else
-#define COVSPLAT_SPLAT_CPU_SIMD16_INL_HPP_
+#define COVSPLAT_CORE_SIMD16_INL_HPP_
 #endif
 // clang-format on
 
@@ -376,4 +376,4 @@ HWY_INLINE Pack3<S> MulAdd(const Pack<S>& s, const Pack3<S>& a, const Pack3<S>& 
 }  // namespace covsplat::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
-#endif  // COVSPLAT_SPLAT_CPU_SIMD16_INL_HPP_
+#endif  // COVSPLAT_CORE_SIMD16_INL_HPP_

@@ -1,0 +1,87 @@
+// Sums over matches of a scan's points with surfels, 16 at a time. Internal to the module.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstring>
+
+#include <Eigen/Core>
+
+#include "covsplat/registration/target.hpp"
+
+namespace covsplat {
+
+/// What matching needs to know of a source point; one cache line.
+struct alignas(64) SourceRecord {
+  Eigen::Vector3f point;  ///< sensor frame at the point's time
+  float phase;
+  Eigen::Matrix<float, 6, 1> covariance;  ///< as that of a surfel, sensor frame at the point's time
+  Eigen::Vector3f normal;                 ///< of unit length, likewise
+};
+
+/// Matches that wait to be summed up, as rows of 16 numbers.
+class MatchBatch {
+ public:
+  static constexpr std::size_t kSize = 16;
+  using Rows = std::array<std::array<float, 16>, kSize>;
+
+  /// `pose`: takes the point to the axes of the map, about the sensor at mid scan. The batch must
+  /// not be full.
+  void Add(std::size_t index,
+           const SourceRecord& source,
+           const RegistrationTarget::Record& surfel,
+           const Eigen::Matrix4f& pose) {
+    std::memcpy(&source_[count_], &source, sizeof(source));
+    std::memcpy(&surfel_[count_], &surfel, sizeof(surfel));
+    std::memcpy(&pose_[count_], pose.data(), sizeof(pose));
+    index_[count_++] = index;
+  }
+  void Clear() { count_ = 0; }
+
+  std::size_t Size() const { return count_; }
+  bool IsFull() const { return count_ == kSize; }
+  std::size_t IndexOf(std::size_t match) const { return index_[match]; }
+  const float* Sources() const { return source_.front().data(); }
+  const float* Surfels() const { return surfel_.front().data(); }
+  const float* Poses() const { return pose_.front().data(); }
+
+ private:
+  // Rows beyond the last match hold what was there before, zeros at first.
+  alignas(64) Rows source_ = {};
+  alignas(64) Rows surfel_ = {};
+  alignas(64) Rows pose_ = {};
+  std::array<std::size_t, kSize> index_ = {};
+  std::size_t count_ = 0;
+};
+
+struct MatchSettings {
+  Eigen::Vector3f sensor;  ///< position at mid scan relative to the target's origin
+  float inverse_kernel_scale;
+  float inlier_distance_m;
+  bool same_side;  ///< pairs that face opposite ways are no matches
+};
+
+/// Sums of the matches that are in one lane of the batches; what they are is said at PhaseMoments.
+struct MatchSums {
+  static constexpr int kMoments = 5;
+  static constexpr int kTerms = 27;
+  static constexpr int kLeverTerms = 10;
+  using Lanes = std::array<float, MatchBatch::kSize>;
+
+  alignas(64) std::array<std::array<Lanes, kTerms>, kMoments> moment = {};
+  alignas(64) std::array<Lanes, kLeverTerms> lever = {};
+  alignas(64) Lanes weighted_square = {};
+  alignas(64) Lanes kernel_sum = {};
+  alignas(64) Lanes kernel_square_sum = {};
+  alignas(64) Lanes plane_square = {};
+  alignas(64) Lanes matches = {};
+  alignas(64) Lanes inliers = {};
+};
+
+/// Adds a batch to the sums. `mahalanobis`: e^T M e of each, infinite if it is no match.
+void SumMatches(const MatchBatch& batch,
+                const MatchSettings& settings,
+                MatchSums& sums,
+                MatchSums::Lanes& mahalanobis);
+
+}  // namespace covsplat
