@@ -37,6 +37,15 @@ class MatchBatch {
     index_[count_++] = index;
   }
   void Clear() { count_ = 0; }
+  /// Repeats the last match in the rows that are left, so that all hold numbers that can be
+  /// calculated with.
+  void FillUp() {
+    for (std::size_t k = count_; k < kSize && count_ > 0; ++k) {
+      source_[k] = source_[count_ - 1];
+      surfel_[k] = surfel_[count_ - 1];
+      pose_[k] = pose_[count_ - 1];
+    }
+  }
 
   std::size_t Size() const { return count_; }
   bool IsFull() const { return count_ == kSize; }
@@ -46,7 +55,6 @@ class MatchBatch {
   const float* Poses() const { return pose_.front().data(); }
 
  private:
-  // Rows beyond the last match hold what was there before, zeros at first.
   alignas(64) Rows source_ = {};
   alignas(64) Rows surfel_ = {};
   alignas(64) Rows pose_ = {};
@@ -78,7 +86,8 @@ struct MatchSums {
   alignas(64) Lanes inliers = {};
 };
 
-/// Adds a batch to the sums. `mahalanobis`: e^T M e of each, infinite if it is no match.
+/// Adds a batch, which has been filled up, to the sums. `mahalanobis`: e^T M e of each, infinite if
+/// it is no match.
 void SumMatches(const MatchBatch& batch,
                 const MatchSettings& settings,
                 MatchSums& sums,

@@ -178,6 +178,7 @@ PhaseMoments ScanResiduals::SumChunk(const Frame& frame, std::size_t begin, std:
   MatchBatch batch;
   const auto sum_up = [&] {
     MatchSums::Lanes mahalanobis;
+    batch.FillUp();
     SumMatches(batch, frame.settings, sums, mahalanobis);
     for (std::size_t k = 0; k < batch.Size(); ++k) {
       mahalanobis_[batch.IndexOf(k)] = mahalanobis[k];

@@ -251,10 +251,10 @@ TrackedScan Tracker::Deskewed(const Scan& scan,
     tracked.squared_distance = std::move(squared_distance);
     return tracked;
   }
+  const PoseTable poses(motion, Eigen::Matrix3d::Identity());
   for (std::size_t i = 0; i < tracked.covariance.size(); ++i) {
-    const Eigen::Matrix3f turn =
-        motion.Within(prepared.source.phase[i]).RotationMatrix().cast<float>();
-    tracked.covariance[i].axes = turn * tracked.covariance[i].axes;
+    Eigen::Matrix3f& axes = tracked.covariance[i].axes;
+    axes = poses.At(prepared.source.phase[i]).rotation * axes;
   }
   tracked.squared_distance = std::move(squared_distance);
   return tracked;

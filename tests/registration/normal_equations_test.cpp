@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "tests/support/registration_fixtures.hpp"
 #include <gtest/gtest.h>
 
@@ -99,6 +101,30 @@ TEST_F(NormalEquationsTest, GradientAndHessianOfAll18UnknownsAgreeWithCentralDif
         << k;
     const double curvature = (above - 2.0 * here + below) / (kStep * kStep);
     EXPECT_NEAR(analytic.hessian(k, k) / curvature, 1.0, 0.12) << k;
+  }
+}
+
+// Matches are summed up 16 at a time: any number that is left over counts as much.
+TEST_F(NormalEquationsTest, FewMatchesCountLikeMany) {
+  for (const std::size_t count :
+       {std::size_t{1}, std::size_t{5}, std::size_t{16}, std::size_t{35}}) {
+    SourceCloud few;
+    few.duration_s = source_.duration_s;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t from = i * source_.Size() / count;
+      few.points.push_back(source_.points[from]);
+      few.phase.push_back(source_.phase[from]);
+      few.covariance.push_back(source_.covariance[from]);
+    }
+    ScanResiduals residuals(few, target_, 1.0, 0.1, false, pool_);
+    const PhaseMoments moments = residuals.Evaluate(motion_, 1e12, 1, pool_);
+    ASSERT_GT(moments.matches, 0u) << count;
+    const FrozenCost cost(few, target_, residuals.Slots(), motion_);
+    EXPECT_NEAR(0.5 * moments.weighted_square / cost(motion_), 1.0, 1e-4) << count;
+    EXPECT_TRUE(Assemble(moments, motion_).hessian.allFinite());
+    const auto matched =
+        std::ranges::count_if(residuals.Slots(), [](int slot) { return slot >= 0; });
+    EXPECT_EQ(moments.matches, static_cast<std::size_t>(matched));
   }
 }
 
