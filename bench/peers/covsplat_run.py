@@ -33,17 +33,14 @@ def simulate_seed(binary: Path, world: str, seed: int, folder: Path) -> None:
 
 
 def run_covsplat(
-    binary: Path, recording: Recording, out: Path, threads: int, *, mapping: bool
+    binary: Path, recording: Recording, out: Path, threads: int, flags: tuple[str, ...]
 ) -> Outcome:
     """Its scans per second are those of the whole run, the mapper's work included.
 
     The times per scan are the tracker's ("scan in to pose out"). CPU time and peak memory are the
     process's, with reading, mapping and writing: upper bounds next to the peers'.
     """
-    command = base_command(binary, recording, out, threads)
-    if not mapping:
-        command += ["-s", "mapping.feedback.mode=frozen"]
-    done = run_program(command)
+    done = run_program([*base_command(binary, recording, out, threads), *flags])
     return Outcome(
         Trajectory.read_tum(out / "trajectory_tum.txt"),
         track_times(out),

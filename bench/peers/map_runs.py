@@ -71,7 +71,8 @@ def methods(setting: Setting) -> Iterator[tuple[str, Make]]:
     """The name of a method ends with whose poses it takes."""
     recording, voxel_m, meshes = setting.recording, setting.voxel_m, setting.out
     estimated = covsplat_folder(setting.out) / "trajectory_tum.txt"
-    yield f"covsplat; {ESTIMATED}", partial(mesh_covsplat, setting)
+    for name in ("covsplat", "covsplat, lockstep"):
+        yield f"{name}; {ESTIMATED}", partial(mesh_covsplat, setting, name)
     tsdf = partial(map_peers.run_tsdf_fusion, recording, voxel_m)
     for name, poses, file, trajectory, truncation_voxels in (
         ("TSDF fusion (as VDBFusion)", TRUE, "tsdf_true_poses.ply", None, 3.0),
@@ -86,12 +87,12 @@ def methods(setting: Setting) -> Iterator[tuple[str, Make]]:
     yield f"Poisson (Open3D); {TRUE}", partial(apart, poisson)
 
 
-def mesh_covsplat(setting: Setting) -> map_peers.MapOutcome:
+def mesh_covsplat(setting: Setting, name: str) -> map_peers.MapOutcome:
     """Of the run that the table of trajectories shows; its scans per second include mapping."""
-    run = covsplat_folder(setting.out)
+    run = covsplat_folder(setting.out, name)
     if not (run / "metrics.json").is_file():
         raise RuntimeError(f"{run}: no run of covsplat; let --only choose its track as well")
-    mesh = setting.out / "covsplat.ply"
+    mesh = run.with_suffix(".ply")
     meshed = mesh_of_run(setting.covsplat, run, mesh, setting.voxel_m, setting.threads)
     metrics = json.loads((run / "metrics.json").read_text())
     tracking_mib = metrics["memory"]["peak_rss_bytes"] / 2**20

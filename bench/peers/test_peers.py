@@ -110,12 +110,12 @@ class CovsplatRunTest(unittest.TestCase):
             binary.write_text(FAKE_BINARY)
             binary.chmod(0o755)
             recording = Recording(folder, np.array([0.0, 0.1]), 0.1)
-            outcome = run_covsplat(binary, recording, folder, 2, mapping=True)
+            outcome = run_covsplat(binary, recording, folder, 2, ())
             np.testing.assert_allclose(outcome.trajectory.positions[:, 0], [0, 1])
             self.assertEqual((outcome.wall_ms, outcome.scans_per_s), ([12.5, 7.5], 9.5))
             self.assertGreater(outcome.peak_mib, 0)
             with self.assertRaisesRegex(RuntimeError, "exit code 4"):
-                run_covsplat(binary, recording, folder / "nowhere", 2, mapping=True)
+                run_covsplat(binary, recording, folder / "nowhere", 2, ())
 
     def test_reads_the_scores_of_a_mesh(self) -> None:
         errors = (

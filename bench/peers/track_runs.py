@@ -20,19 +20,26 @@ RPE_WAY_M = 1.0
 Run = Callable[[], peers.Outcome]
 
 
-def covsplat_folder(out: Path) -> Path:
-    """Where the run of covsplat itself lies among the results of a recording."""
-    return out / "covsplat"
+# Ways to run covsplat, with their flags.
+COVSPLAT = {
+    "covsplat": (),
+    "covsplat, lockstep": ("--deterministic",),
+    "covsplat, frozen map": ("-s", "mapping.feedback.mode=frozen"),
+}
+
+
+def covsplat_folder(out: Path, name: str = "covsplat") -> Path:
+    """Where a run of covsplat lies among the results of a recording."""
+    return out / name.replace(", ", "_").replace(" ", "_")
 
 
 def methods(
     recording: Recording, covsplat: Path | None, out: Path, threads: int
 ) -> Iterator[tuple[str, Run]]:
     if covsplat is not None:
-        for name, mapping in (("covsplat", True), ("covsplat, frozen map", False)):
-            folder = covsplat_folder(out) if mapping else out / "covsplat_frozen_map"
-            run = partial(run_covsplat, covsplat, recording, folder, threads, mapping=mapping)
-            yield name, run
+        for name, flags in COVSPLAT.items():
+            folder = covsplat_folder(out, name)
+            yield name, partial(run_covsplat, covsplat, recording, folder, threads, flags)
     yield "KISS-ICP", partial(apart, partial(peers.run_kiss_icp, recording, threads))
     yield "KISS-SLAM", partial(apart, partial(peers.run_kiss_slam, recording, threads))
     for deskew in (False, True) if recording.is_simulated else (False,):
