@@ -20,7 +20,7 @@ constexpr double kFirstGateM = 5.0;
 constexpr double kLastGateM = 0.5;
 
 std::vector<Eigen::Vector3d> LowestPoints(std::span<const Eigen::Vector3f> points) {
-  VoxelHash cells(points.size());
+  VoxelHash cells;
   std::vector<Eigen::Vector3d> lowest;
   for (const Eigen::Vector3f& point : points) {
     const Eigen::Vector3f flat(point.x(), point.y(), 0.0f);

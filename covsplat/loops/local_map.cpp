@@ -28,9 +28,7 @@ struct LocalPoint {
 };
 
 std::vector<LocalPoint> Gather(const LocalMap& map, double voxel_m, bool only_flat) {
-  std::size_t all = 0;
-  for (const PosedPlace& posed : map) all += posed.place->points.size();
-  VoxelHash taken(all);
+  VoxelHash taken;
   std::vector<LocalPoint> points;
   for (const PosedPlace& posed : map) {
     const Eigen::Matrix3f rotation = posed.T_local_place.RotationMatrix().cast<float>();
@@ -58,7 +56,7 @@ Place MakePlace(int keyframe,
                 std::span<const PointCovariance> covariance,
                 double voxel_m) {
   Place place{keyframe, {}, Sight(points)};
-  VoxelHash taken(surface.size());
+  VoxelHash taken;
   for (std::size_t i = 0; i < surface.size(); ++i) {
     if (!(surface[i].cwiseAbs().maxCoeff() <= PlacePoint::kFarthestM)) continue;
     const auto fresh = static_cast<int>(place.points.size());

@@ -81,9 +81,7 @@ std::vector<std::uint8_t> WhichAreNextToNew(const NearGaussians& near,
   const auto cell_of = [&](const Disc& disc) {
     return CellOf(Eigen::Vector3f(disc.mean / static_cast<float>(cell_m)));
   };
-  const auto fresh = static_cast<std::size_t>(std::ranges::count_if(
-      near.keyframe, [&](int keyframe) { return keyframe >= first_new_keyframe; }));
-  VoxelHash cells(kNeighbours * fresh);
+  VoxelHash cells;
   for (std::size_t i = 0; i < near.discs.size(); ++i) {
     if (near.keyframe[i] < first_new_keyframe) continue;
     const Eigen::Vector3i cell = cell_of(near.discs[i]);

@@ -200,7 +200,7 @@ void JoinWithin(std::vector<std::size_t> cell,
 std::vector<std::vector<std::size_t>> CellsOf(const std::vector<Piece>& pieces,
                                               double cell_m,
                                               double shift) {
-  VoxelHash cell_of(pieces.size());
+  VoxelHash cell_of;
   std::vector<std::vector<std::size_t>> cells;
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     const Eigen::Vector3f at = (pieces[i].mean / cell_m).cast<float>();

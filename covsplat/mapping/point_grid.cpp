@@ -88,7 +88,6 @@ PointGrid::Sorted PointGrid::SortIntoBlocks(std::span<const PosedPoints> scans,
   Sorted sorted;
   std::size_t total = 0;
   for (const PosedPoints& scan : scans) total += scan.points.size();
-  block_at_ = VoxelHash(std::min(total, kMaxBlocks));
   const auto min_square = static_cast<float>(sensor.MinRange() * sensor.MinRange());
   const auto max_square = static_cast<float>(sensor.MaxRange() * sensor.MaxRange());
   std::vector<Sorted::Point> points;
@@ -132,10 +131,6 @@ PointGrid::Sorted PointGrid::SortIntoBlocks(std::span<const PosedPoints> scans,
     sorted.points[next[static_cast<std::size_t>(block_of[i])]++] = points[i];
   }
   return sorted;
-}
-
-Eigen::Vector3i PointGrid::FinestCellOf(const Eigen::Vector3f& p_grid) const {
-  return CellOf(finest_per_m_ * p_grid);
 }
 
 Eigen::Vector3i PointGrid::BlockOf(const Eigen::Vector3i& finest_cell) const {
@@ -196,9 +191,7 @@ bool PointGrid::IsWithinCell(const Eigen::Vector3f& p_grid, const Eigen::Vector3
   return (inside >= margin).all() && (inside + margin < 1.0f).all();
 }
 
-std::optional<PointGrid::Place> PointGrid::Finder::FindNew(const Eigen::Vector3f& p_grid) {
-  const Eigen::Vector3i finest_cell = grid_.FinestCellOf(p_grid);
-  if (finest_cell == finest_cell_) return std::nullopt;
+std::optional<PointGrid::Place> PointGrid::Finder::Enter(const Eigen::Vector3i& finest_cell) {
   finest_cell_ = finest_cell;
   const Eigen::Vector3i block_index = grid_.BlockOf(finest_cell);
   if (block_index != block_index_) {

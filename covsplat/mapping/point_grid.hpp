@@ -91,7 +91,9 @@ class PointGrid {
   struct Sorted;
   Sorted SortIntoBlocks(std::span<const PosedPoints> scans, const SensorModel& sensor);
   /// Coordinates of finest cells, of the block that holds one, and its code there.
-  Eigen::Vector3i FinestCellOf(const Eigen::Vector3f& p_grid) const;
+  Eigen::Vector3i FinestCellOf(const Eigen::Vector3f& p_grid) const {
+    return CellOf(finest_per_m_ * p_grid);
+  }
   Eigen::Vector3i BlockOf(const Eigen::Vector3i& finest_cell) const;
   int CodeOf(const Eigen::Vector3i& finest_cell) const;
   std::vector<PointCell> CellsOf(const Sorted& sorted, std::size_t block) const;
@@ -100,7 +102,7 @@ class PointGrid {
   double block_m_;
   int levels_;
   float finest_per_m_;
-  VoxelHash block_at_{0};
+  VoxelHash block_at_;
   std::vector<Eigen::Vector3i> index_of_;      ///< [B]
   std::vector<std::vector<PointCell>> cells_;  ///< [B] by code
 };
@@ -111,9 +113,14 @@ class PointGrid::Finder {
 
   /// As the grid's Find, but says nothing about a position in the same finest cell as the one
   /// before.
-  std::optional<Place> FindNew(const Eigen::Vector3f& p_grid);
+  std::optional<Place> FindNew(const Eigen::Vector3f& p_grid) {
+    const Eigen::Vector3i finest_cell = grid_.FinestCellOf(p_grid);
+    return finest_cell == finest_cell_ ? std::nullopt : Enter(finest_cell);
+  }
 
  private:
+  std::optional<Place> Enter(const Eigen::Vector3i& finest_cell);
+
   const PointGrid& grid_;
   Eigen::Vector3i finest_cell_ = Eigen::Vector3i::Constant(std::numeric_limits<int>::max());
   Eigen::Vector3i block_index_ = Eigen::Vector3i::Constant(std::numeric_limits<int>::max());

@@ -49,7 +49,7 @@ std::vector<Site> ChooseSites(const Keyframe& keyframe,
                               std::span<const std::uint8_t> covered,
                               const SpawnConfig& config) {
   const auto cells_per_m = static_cast<float>(1.0 / config.voxel_m);
-  VoxelHash taken(keyframe.point.Size() + existing_sensor.size());
+  VoxelHash taken(existing_sensor.size());
   for (const Disc& disc : existing_sensor) {
     taken.FindOrInsert(CellOf(cells_per_m * disc.mean), kOccupied);
   }

@@ -30,7 +30,7 @@ inline Eigen::Vector3i CellOf(const Eigen::Vector3f& position) {
 /// +-2^20 share entries with others.
 class VoxelHash {
  public:
-  explicit VoxelHash(std::size_t expected_cells) {
+  explicit VoxelHash(std::size_t expected_cells = 0) {
     Allocate(std::bit_ceil(2 * expected_cells + 2));
   }
 

@@ -140,7 +140,7 @@ class VoxelMoments::Neighbourhood {
 };
 
 VoxelMoments::VoxelMoments(std::span<const Eigen::Vector4f> points, float voxel_m)
-    : voxel_m_(voxel_m), columns_(0) {
+    : voxel_m_(voxel_m) {
   COVSPLAT_CHECK(voxel_m > 0.0f);
   Collect(points);
   SortIntoColumns();

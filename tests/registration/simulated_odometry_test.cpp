@@ -28,7 +28,7 @@ RegistrationTarget MapOfTheRoom(ThreadPool& pool) {
         PreprocessStill(TrulyDeskewed(scan, HandheldWalk, stamp), pool), HandheldWalk(stamp), all);
   }
   std::vector<TargetSurfel> thinned;
-  VoxelHash taken(all.size());
+  VoxelHash taken;
   for (const TargetSurfel& surfel : all) {
     const int next = static_cast<int>(thinned.size());
     if (taken.FindOrInsert(CellOf(surfel.mean / 0.2f), next) == next) thinned.push_back(surfel);
