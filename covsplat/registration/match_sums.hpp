@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstddef>
-#include <cstring>
 
 #include <Eigen/Core>
 
@@ -19,11 +18,12 @@ struct alignas(64) SourceRecord {
   Eigen::Vector3f normal;                 ///< of unit length, likewise
 };
 
-/// Matches that wait to be summed up, as rows of 16 numbers.
+static_assert(sizeof(SourceRecord) == 64 && sizeof(RegistrationTarget::Record) == 64);
+
+/// Matches that wait to be summed up, as tables whose rows are 16 numbers.
 class MatchBatch {
  public:
   static constexpr std::size_t kSize = 16;
-  using Rows = std::array<std::array<float, 16>, kSize>;
 
   /// `pose`: takes the point to the axes of the map, about the sensor at mid scan. The batch must
   /// not be full.
@@ -31,9 +31,9 @@ class MatchBatch {
            const SourceRecord& source,
            const RegistrationTarget::Record& surfel,
            const Eigen::Matrix4f& pose) {
-    std::memcpy(&source_[count_], &source, sizeof(source));
-    std::memcpy(&surfel_[count_], &surfel, sizeof(surfel));
-    std::memcpy(&pose_[count_], pose.data(), sizeof(pose));
+    source_[count_] = source;
+    surfel_[count_] = surfel;
+    pose_[count_] = pose;
     index_[count_++] = index;
   }
   void Clear() { count_ = 0; }
@@ -50,14 +50,14 @@ class MatchBatch {
   std::size_t Size() const { return count_; }
   bool IsFull() const { return count_ == kSize; }
   std::size_t IndexOf(std::size_t match) const { return index_[match]; }
-  const float* Sources() const { return source_.front().data(); }
-  const float* Surfels() const { return surfel_.front().data(); }
+  const float* Sources() const { return source_.front().point.data(); }
+  const float* Surfels() const { return surfel_.front().mean.data(); }
   const float* Poses() const { return pose_.front().data(); }
 
  private:
-  alignas(64) Rows source_ = {};
-  alignas(64) Rows surfel_ = {};
-  alignas(64) Rows pose_ = {};
+  std::array<SourceRecord, kSize> source_;
+  std::array<RegistrationTarget::Record, kSize> surfel_;
+  alignas(64) std::array<Eigen::Matrix4f, kSize> pose_;
   std::array<std::size_t, kSize> index_ = {};
   std::size_t count_ = 0;
 };

@@ -42,7 +42,7 @@ float SquaredGap(const Eigen::Vector3f& position, int x, int y, int z) {
 }  // namespace
 
 NearestIndex::NearestIndex(std::span<const Eigen::Vector3f> points, float cell_m)
-    : cell_m_(cell_m), cells_per_m_(1.0f / cell_m), cells_(points.size() / 4) {
+    : cells_per_m_(1.0f / cell_m), cells_(points.size() / 4) {
   COVSPLAT_CHECK(cell_m > 0.0f);
   const std::size_t n = points.size();
   std::vector<int> cell_of(n);

@@ -66,7 +66,6 @@ class NearestIndex {
   void ScanCell(const Eigen::Vector3i& cell, Search& search) const;
   void Consider(int slot, float squared, Search& search) const;
 
-  float cell_m_;
   float cells_per_m_;
   VoxelHash cells_;               // cell -> position in begin_
   std::vector<int> begin_;        // [cells + 1], first slot of each cell
