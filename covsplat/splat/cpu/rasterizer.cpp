@@ -39,7 +39,7 @@ void Rasterizer<S>::LookFrom(const SE3& T_map_sensor,
   };
   std::erase_if(active_, [&](std::uint32_t block) { return !is_visible(block); });
   slots_.resize(16 * Pairs());
-  slot_used_.assign(Pairs(), 0);
+  slot_state_.assign(Pairs(), kUnseen);
   bins_are_fresh_ = true;
 }
 
@@ -70,7 +70,7 @@ TileJob<S> Rasterizer<S>::MakeTileJob() {
   job.drop_unseen = std::exchange(bins_are_fresh_, false);
   job.images = &images_;
   job.slots = slots_.data();
-  job.slot_used = slot_used_.data();
+  job.slot_state = slot_state_.data();
   return job;
 }
 
@@ -118,7 +118,7 @@ OptimizeJob<S> Rasterizer<S>::MakeOptimizeJob(GaussianColumns<S>& gaussians) {
   job.records = records_.data();
   job.bins = &binner_.Bins();
   job.slots = slots_.data();
-  job.slot_used = slot_used_.data();
+  job.slot_state = slot_state_.data();
   return job;
 }
 

@@ -65,8 +65,8 @@ class Rasterizer {
   std::vector<TileBox> boxes_;
   TileBinner binner_;
   TileImages<S> images_;
-  std::vector<S> slots_;
-  std::vector<std::uint8_t> slot_used_;
+  AlignedVector<S> slots_;
+  std::vector<SlotState> slot_state_;
   bool bins_are_fresh_ = false;  ///< no pass has dropped what is not seen yet
 };
 

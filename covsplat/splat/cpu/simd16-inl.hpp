@@ -56,6 +56,7 @@ COVSPLAT_PACK_BINARY(operator*, Mul)
 COVSPLAT_PACK_BINARY(operator/, Div)
 COVSPLAT_PACK_BINARY(Min, Min)
 COVSPLAT_PACK_BINARY(Max, Max)
+COVSPLAT_PACK_BINARY(CopySign, CopySign)
 #undef COVSPLAT_PACK_BINARY
 
 #define COVSPLAT_PACK_UNARY(NAME, OP)             \
@@ -188,32 +189,36 @@ HWY_INLINE Pack<S> Reciprocal(const Pack<S>& a) {
   }
 }
 
-/// exp(a) for -87 <= a <= 88; float: degree-6 polynomial on the fraction of a / ln 2, 1e-7
-/// relative.
+/// 2^a for -126 <= a <= 127; float: polynomial on the fraction of a, 2e-7 relative.
 template <class S>
-HWY_INLINE Pack<S> ExpBounded(const Pack<S>& a) {
+HWY_INLINE Pack<S> Exp2Bounded(const Pack<S>& a) {
   Pack<S> r;
+  const Tag<S> d;
   for (std::size_t i = 0; i < kParts<S>; ++i) {
     if constexpr (sizeof(S) == 4) {
-      const Tag<S> d;
       const hn::RebindToSigned<Tag<S>> di;
-      const auto scaled = hn::Mul(a.part[i], hn::Set(d, S(1.44269504088896341)));
-      const auto whole = hn::Round(scaled);
-      const auto f = hn::Sub(scaled, whole);
-      auto p = hn::Set(d, S(1.5403530e-4));
-      p = hn::MulAdd(p, f, hn::Set(d, S(1.3333558e-3)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(9.6181291e-3)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(5.5504109e-2)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(2.4022651e-1)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(6.9314718e-1)));
+      const auto whole = hn::Round(a.part[i]);
+      const auto f = hn::Sub(a.part[i], whole);
+      // Minimax for the relative error on [-1/2, 1/2], but exact at 0.
+      auto p = hn::Set(d, S(1.3276472e-3));
+      p = hn::MulAdd(p, f, hn::Set(d, S(9.6755413e-3)));
+      p = hn::MulAdd(p, f, hn::Set(d, S(5.5507133e-2)));
+      p = hn::MulAdd(p, f, hn::Set(d, S(2.4022120e-1)));
+      p = hn::MulAdd(p, f, hn::Set(d, S(6.9314697e-1)));
       p = hn::MulAdd(p, f, hn::Set(d, S(1)));
       const auto exponent = hn::ShiftLeft<23>(hn::ConvertTo(di, whole));
       r.part[i] = hn::BitCast(d, hn::Add(hn::BitCast(di, p), exponent));
     } else {
-      r.part[i] = hn::Exp(Tag<S>(), a.part[i]);
+      r.part[i] = hn::Exp(d, hn::Mul(a.part[i], hn::Set(d, S(0.69314718055994530942))));
     }
   }
   return r;
+}
+
+/// exp(a) for -87 <= a <= 88; float: 1e-6 relative at the ends, 2e-7 near 0.
+template <class S>
+HWY_INLINE Pack<S> ExpBounded(const Pack<S>& a) {
+  return Exp2Bounded(a * All(S(1.44269504088896341)));
 }
 
 template <class S>
@@ -276,20 +281,20 @@ HWY_INLINE hn::Vec<hn::CappedTag<S, kBlock<S>>> SumOfBlocks(D d, V v) {
   }
 }
 
-/// Sums of the lanes of 16 packs: out[k] = sum of terms[k], in an order that depends on nothing but
-/// the instruction set.
-template <class S>
-HWY_INLINE void SumEach(const Pack<S> (&terms)[16], S* HWY_RESTRICT out) {
+/// Sums of the lanes of packs, a multiple of 4: out[k] = sum of terms[k], in an order that depends
+/// on nothing but the instruction set.
+template <class S, std::size_t kCount>
+HWY_INLINE void SumEach(const Pack<S> (&terms)[kCount], S* HWY_RESTRICT out) {
   const Tag<S> d;
-  hn::Vec<Tag<S>> v[16];
-  for (std::size_t k = 0; k < 16; ++k) {
+  hn::Vec<Tag<S>> v[kCount];
+  for (std::size_t k = 0; k < kCount; ++k) {
     v[k] = terms[k].part[0];
     for (std::size_t i = 1; i < kParts<S>; ++i) v[k] = hn::Add(v[k], terms[k].part[i]);
   }
   const hn::CappedTag<S, kBlock<S>> block;
   if constexpr (sizeof(S) == 4) {
     const hn::Repartition<double, Tag<S>> wide;
-    for (std::size_t k = 0; k < 16; k += 4) {
+    for (std::size_t k = 0; k < kCount; k += 4) {
       const auto p =
           hn::Add(hn::InterleaveLower(d, v[k], v[k + 1]), hn::InterleaveUpper(d, v[k], v[k + 1]));
       const auto q = hn::Add(hn::InterleaveLower(d, v[k + 2], v[k + 3]),
@@ -301,12 +306,18 @@ HWY_INLINE void SumEach(const Pack<S> (&terms)[16], S* HWY_RESTRICT out) {
       hn::StoreU(SumOfBlocks<S>(d, sums), block, out + k);
     }
   } else {
-    for (std::size_t k = 0; k < 16; k += 2) {
+    for (std::size_t k = 0; k < kCount; k += 2) {
       const auto sums =
           hn::Add(hn::InterleaveLower(d, v[k], v[k + 1]), hn::InterleaveUpper(d, v[k], v[k + 1]));
       hn::StoreU(SumOfBlocks<S>(d, sums), block, out + k);
     }
   }
+}
+
+template <std::size_t kCount, class S>
+HWY_INLINE void StoreZeros(S* HWY_RESTRICT to) {
+  const hn::CappedTag<S, kBlock<S>> block;
+  for (std::size_t i = 0; i < kCount; i += kBlock<S>) hn::StoreU(hn::Zero(block), block, to + i);
 }
 
 /// out[j][i] = in[i][j] for 16 x 16 scalars.
@@ -348,6 +359,12 @@ struct Pack3 {
 template <class S>
 HWY_INLINE Pack<S> Dot(const Pack3<S>& a, const Pack3<S>& b) {
   return MulAdd(a.x, b.x, MulAdd(a.y, b.y, a.z * b.z));
+}
+
+/// <a, b> + c.
+template <class S>
+HWY_INLINE Pack<S> DotAdd(const Pack3<S>& a, const Pack3<S>& b, const Pack<S>& c) {
+  return MulAdd(a.x, b.x, MulAdd(a.y, b.y, MulAdd(a.z, b.z, c)));
 }
 
 template <class S>
