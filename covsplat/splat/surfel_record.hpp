@@ -54,6 +54,8 @@ struct TileBox {
   std::int16_t y1 = -1;
 };
 
+inline bool IsEmpty(const TileBox& box) { return box.x1 < box.x0 || box.y1 < box.y0; }
+
 /// One Gaussian in one tile's list.
 struct TilePair {
   std::uint32_t record = 0;

@@ -58,7 +58,7 @@ struct TileBins {
   std::vector<std::uint32_t> tile_begin;  ///< [tiles] into pairs
   std::vector<std::uint32_t> tile_end;    ///< [tiles]
   std::vector<TilePair> pairs;
-  std::vector<std::uint32_t> slot_begin;  ///< [records + 1]
+  std::vector<std::uint32_t> slot_begin;  ///< [records + 1]; empty: slots are not assigned yet
 };
 
 /// What a pass over the tiles left in the slot of a pair.

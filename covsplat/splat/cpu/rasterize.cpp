@@ -114,18 +114,12 @@ HWY_INLINE Pack3<S> Broadcast(const S* v) {
   return {All(v[0]), All(v[1]), All(v[2])};
 }
 
-/// Centre of a Gaussian minus the tile's pixels, px, the short way round the turn.
+/// Column of a Gaussian's centre from the tile's corner, px, the short way round the turn.
 template <class S>
-struct Offsets {
-  Pack<S> column, row;
-};
-
-template <class S>
-HWY_INLINE Offsets<S> OffsetsTo(const SurfelRecord<S>& surfel, const TileRays<S>& rays) {
-  S local = surfel.column - rays.corner_column;
+HWY_INLINE S LocalColumn(const SurfelRecord<S>& surfel, const TileRays<S>& rays) {
+  const S local = surfel.column - rays.corner_column;
   const S half = S(0.5) * rays.columns;
-  local = local > half ? local - rays.columns : local < -half ? local + rays.columns : local;
-  return {All(local) - rays.column, All(surfel.row - rays.corner_row) - rays.row};
+  return local > half ? local - rays.columns : local < -half ? local + rays.columns : local;
 }
 
 /// What a pass over a tile is for; it leaves out what only others need.
@@ -159,49 +153,87 @@ HWY_INLINE Blend<S> EmptyBlend() {
   return {All(S(1)), zero, zero, All(S(-1)), {zero, zero, zero}, zero};
 }
 
-/// Blends one Gaussian into the tile (algorithm: the nearer of surface and screen-space filter in
-/// standard deviations) as number `count` of the kept ones. Returns which pixels see it.
+/// Gaussians whose meetings with the rays are computed together. One where a pack needs several
+/// vectors: these already interleave, and registers are few.
+template <class S>
+inline constexpr std::size_t kTogether = kParts<S> == 1 ? 2 : 1;
+
+/// Where the rays of a tile meet some Gaussians.
+template <class S, std::size_t kCount>
+struct Meeting {
+  Pack<S, kCount> alpha;         ///< capped, not cut
+  Pack<S, kCount> range;         ///< of the ray's point on the surface, or of the centre
+  Pack<S, kCount> signed_range;  ///< as in KeptSurfels
+};
+
+/// The nearer of surface and screen-space filter in standard deviations (algorithm 7.5).
+template <class S, std::size_t kCount>
+HWY_INLINE Meeting<S, kCount> Meet(const ViewGeometry<S>& view,
+                                   const TileRays<S>& rays,
+                                   const SurfelRecord<S>* const (&surfels)[kCount]) {
+  constexpr S kHalfLog2E = S(0.72134752044448170368);
+  const auto all = [](S value) { return All<kCount>(value); };
+  const auto each = [&](auto&& field) {
+    return AllOfEach<kCount, S>([&](std::size_t i) { return field(*surfels[i]); });
+  };
+  const auto dot_ray = [&](auto&& axis) {
+    const Pack3<S, kCount> a{each([&](const SurfelRecord<S>& s) { return axis(s)[0]; }),
+                             each([&](const SurfelRecord<S>& s) { return axis(s)[1]; }),
+                             each([&](const SurfelRecord<S>& s) { return axis(s)[2]; })};
+    return Dot(a, Repeat<kCount>(rays.ray));
+  };
+  using Record = const SurfelRecord<S>&;
+  const Pack<S, kCount> n_ray = dot_ray([](Record s) { return s.n; });
+  const auto steep = Abs(n_ray) > all(view.grazing_cosine);
+  const Pack<S, kCount> t = each([](Record s) { return s.plane; }) * Reciprocal(n_ray);
+  const Pack<S, kCount> a =
+      MulAdd(t, dot_ray([](Record s) { return s.u; }), each([](Record s) { return -s.u_c; }));
+  const Pack<S, kCount> b =
+      MulAdd(t, dot_ray([](Record s) { return s.v; }), each([](Record s) { return -s.v_c; }));
+  const Pack<S, kCount> dx =
+      each([&](Record s) { return LocalColumn(s, rays); }) - Repeat<kCount>(rays.column);
+  const Pack<S, kCount> dy =
+      each([&](Record s) { return s.row - rays.corner_row; }) - Repeat<kCount>(rays.row);
+  const Pack<S, kCount> surface = MulAdd(a, a, b * b);
+  const Pack<S, kCount> filter = all(view.lowpass) * MulAdd(dx, dx, dy * dy);
+  const auto on_surface = steep & (t > all(view.near_m)) & (surface <= filter);
+  const Pack<S, kCount> distance = Select(on_surface, surface, filter);
+  const Pack<S, kCount> exponent = Max(all(-kHalfLog2E) * distance, all(S(-115)));
+  const Pack<S, kCount> opacity = each([](Record s) { return s.opacity; });
+  const Pack<S, kCount> range = each([](Record s) { return s.range; });
+  return {Min(opacity * Exp2Bounded(exponent), all(view.alpha_cap)),
+          Select(on_surface, t, range),
+          Select(on_surface, t, -range)};
+}
+
+/// Blends one Gaussian into the tile as number `count` of the kept ones; `met` are its values of a
+/// Meeting. Returns which pixels see it.
 template <Pass kPass, class S>
 HWY_INLINE PackMask<S> BlendSurfel(const ViewGeometry<S>& view,
-                                   const TileRays<S>& rays,
                                    const PixelRanges<S>& ranges,
                                    const SurfelRecord<S>& s,
+                                   const Meeting<S, 1>& met,
                                    std::size_t count,
                                    Blend<S>& blend,
                                    KeptSurfels<S>& kept) {
-  constexpr S kHalfLog2E = S(0.72134752044448170368);
-  const Pack<S> n_ray = Dot(Broadcast(s.n), rays.ray);
-  const auto steep = Abs(n_ray) > All(view.grazing_cosine);
-  const Pack<S> t = All(s.plane) * Reciprocal(n_ray);
-  const Pack<S> a = MulAdd(t, Dot(Broadcast(s.u), rays.ray), All(-s.u_c));
-  const Pack<S> b = MulAdd(t, Dot(Broadcast(s.v), rays.ray), All(-s.v_c));
-  const Offsets<S> to_centre = OffsetsTo(s, rays);
-  const Pack<S> surface = MulAdd(a, a, b * b);
-  const Pack<S> filter =
-      All(view.lowpass) * MulAdd(to_centre.column, to_centre.column, to_centre.row * to_centre.row);
-  const auto on_surface = steep & (t > All(view.near_m)) & (surface <= filter);
-  const Pack<S> distance = Select(on_surface, surface, filter);
-  const Pack<S> exponent = Max(All(-kHalfLog2E) * distance, All(S(-115)));
-  Pack<S> alpha = Min(All(s.opacity) * Exp2Bounded(exponent), All(view.alpha_cap));
   const auto seen =
-      (alpha >= All(view.alpha_min)) & (blend.transmittance > All(view.transmittance_min));
-  alpha = SelectOrZero(seen, alpha);
-  const Pack<S> range = Select(on_surface, t, All(s.range));
+      (met.alpha >= All(view.alpha_min)) & (blend.transmittance > All(view.transmittance_min));
+  const Pack<S> alpha = SelectOrZero(seen, met.alpha);
   const Pack<S> weight = alpha * blend.transmittance;
   blend.normal = MulAdd(weight, Broadcast(s.n), blend.normal);
   if constexpr (kPass != Pass::kLearn) {
     const auto takes_median = seen & (blend.transmittance > All(S(0.5)));
-    blend.median = Select(takes_median, range, blend.median);
-    blend.range_sum = MulAdd(weight, range, blend.range_sum);
+    blend.median = Select(takes_median, met.range, blend.median);
+    blend.range_sum = MulAdd(weight, met.range, blend.range_sum);
     if constexpr (kPass == Pass::kAll) {
       blend.median_entry = Select(takes_median, All(static_cast<S>(count)), blend.median_entry);
     }
   }
   if constexpr (kPass != Pass::kRender) {
-    const Pack<S> error = Min(Abs(range - ranges.measured), ranges.cap);
+    const Pack<S> error = Min(Abs(met.range - ranges.measured), ranges.cap);
     blend.error_sum = MulAdd(weight, error, blend.error_sum);
     StorePack(alpha, &kept.alpha[16 * count]);
-    StorePack(Select(on_surface, t, All(-s.range)), &kept.range[16 * count]);
+    StorePack(met.signed_range, &kept.range[16 * count]);
   }
   blend.transmittance = blend.transmittance - weight;
   return seen;
@@ -220,13 +252,20 @@ HWY_INLINE std::size_t BlendTile(const TileJob<S>& job,
   kept.MakeRoom(end - begin + 1);
   const TilePair* pairs = job.bins->pairs.data();
   std::size_t count = 0;
-  for (std::uint32_t k = begin; k < end; ++k) {
-    if (k + kPrefetchAhead < end) hwy::Prefetch(&job.records[pairs[k + kPrefetchAhead].record]);
-    const SurfelRecord<S>& surfel = job.records[pairs[k].record];
-    const auto seen = BlendSurfel<kPass>(*job.view, rays, ranges, surfel, count, blend, kept);
-    // What is not seen is overwritten by the next one: cheaper than a branch that is often wrong.
-    kept.pair[count] = pairs[k];
-    count += None(seen) ? 0 : 1;
+  for (std::uint32_t k = begin; k < end; k += kTogether<S>) {
+    const SurfelRecord<S>* surfels[kTogether<S>];
+    for (std::uint32_t i = 0; i < kTogether<S>; ++i) {
+      surfels[i] = &job.records[pairs[std::min(k + i, end - 1)].record];
+      hwy::Prefetch(&job.records[pairs[std::min(k + i + kPrefetchAhead, end - 1)].record]);
+    }
+    const Meeting<S, kTogether<S>> met = Meet<S>(*job.view, rays, surfels);
+    for (std::uint32_t i = 0; i < kTogether<S> && k + i < end; ++i) {
+      const Meeting<S, 1> one{Nth(met.alpha, i), Nth(met.range, i), Nth(met.signed_range, i)};
+      const auto seen = BlendSurfel<kPass>(*job.view, ranges, *surfels[i], one, count, blend, kept);
+      // What is not seen is overwritten by the next one: cheaper than a branch that is often wrong.
+      kept.pair[count] = pairs[k + i];
+      count += None(seen) ? 0 : 1;
+    }
     if (None(blend.transmittance > All(job.view->transmittance_min))) break;
   }
   if (job.drop_unseen) {
@@ -389,12 +428,11 @@ HWY_INLINE void SumSurfelGradient(const ViewGeometry<S>& view,
   if constexpr (kPass == Pass::kLearn) {
     StoreZeros<4>(slot + kSlotColumn);
   } else {
-    const Offsets<S> to_centre = OffsetsTo(s, rays);
+    const Pack<S> dx = All(LocalColumn(s, rays)) - rays.column;
+    const Pack<S> dy = All(s.row - rays.corner_row) - rays.row;
     const Pack<S> g_filter = All(-view.lowpass) * Select(on_surface, zero, ray.alpha);
-    const Pack<S> filter_terms[4] = {g_filter * to_centre.column,
-                                     g_filter * to_centre.row,
-                                     Select(on_surface, zero, ray.range),
-                                     zero};
+    const Pack<S> filter_terms[4] = {
+        g_filter * dx, g_filter * dy, Select(on_surface, zero, ray.range), zero};
     SumEach(filter_terms, slot + kSlotColumn);
   }
 }

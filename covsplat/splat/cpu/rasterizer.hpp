@@ -52,7 +52,9 @@ class Rasterizer {
  private:
   void Project(const GaussianColumns<S>& gaussians, bool with_boxes);
   TileJob<S> MakeTileJob();
-  LossSums RunStep(const TileJob<S>& job);
+  /// Gives the pairs their slots where they have none.
+  void PrepareSlots();
+  LossSums RunStep(TileJob<S> job);
   OptimizeJob<S> MakeOptimizeJob(GaussianColumns<S>& gaussians);
 
   ThreadPool& pool_;
