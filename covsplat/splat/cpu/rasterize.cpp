@@ -141,6 +141,7 @@ struct Blend {
   Pack<S> transmittance, range_sum, median;
   Pack<S> median_entry;  ///< number of the median Gaussian among the kept ones
   Pack3<S> normal;
+  PackMask<S> open;  ///< pixels whose rays go on
   /// Sum of w * min(|range - measured|, cap): by how much rays miss the measurement, each of the
   /// Gaussians for itself. The mean of their ranges would also be right where what lies in front
   /// makes up for what lies behind.
@@ -150,7 +151,7 @@ struct Blend {
 template <class S>
 HWY_INLINE Blend<S> EmptyBlend() {
   const Pack<S> zero = All(S(0));
-  return {All(S(1)), zero, zero, All(S(-1)), {zero, zero, zero}, zero};
+  return {All(S(1)), zero, zero, All(S(-1)), {zero, zero, zero}, All(S(1)) > zero, zero};
 }
 
 /// Gaussians whose meetings with the rays are computed together. One where a pack needs several
@@ -184,7 +185,7 @@ HWY_INLINE Meeting<S, kCount> Meet(const ViewGeometry<S>& view,
   };
   using Record = const SurfelRecord<S>&;
   const Pack<S, kCount> n_ray = dot_ray([](Record s) { return s.n; });
-  const auto steep = Abs(n_ray) > all(view.grazing_cosine);
+  const auto steep = n_ray < all(-view.grazing_cosine);  // what t is positive for faces the ray
   const Pack<S, kCount> t = each([](Record s) { return s.plane; }) * Reciprocal(n_ray);
   const Pack<S, kCount> a =
       MulAdd(t, dot_ray([](Record s) { return s.u; }), each([](Record s) { return -s.u_c; }));
@@ -216,8 +217,7 @@ HWY_INLINE PackMask<S> BlendSurfel(const ViewGeometry<S>& view,
                                    std::size_t count,
                                    Blend<S>& blend,
                                    KeptSurfels<S>& kept) {
-  const auto seen =
-      (met.alpha >= All(view.alpha_min)) & (blend.transmittance > All(view.transmittance_min));
+  const auto seen = (met.alpha >= All(view.alpha_min)) & blend.open;
   const Pack<S> alpha = SelectOrZero(seen, met.alpha);
   const Pack<S> weight = alpha * blend.transmittance;
   blend.normal = MulAdd(weight, Broadcast(s.n), blend.normal);
@@ -236,6 +236,7 @@ HWY_INLINE PackMask<S> BlendSurfel(const ViewGeometry<S>& view,
     StorePack(met.signed_range, &kept.range[16 * count]);
   }
   blend.transmittance = blend.transmittance - weight;
+  blend.open = blend.transmittance > All(view.transmittance_min);
   return seen;
 }
 
@@ -266,7 +267,7 @@ HWY_INLINE std::size_t BlendTile(const TileJob<S>& job,
       kept.pair[count] = pairs[k + i];
       count += None(seen) ? 0 : 1;
     }
-    if (None(blend.transmittance > All(job.view->transmittance_min))) break;
+    if (None(blend.open)) break;
   }
   if (job.drop_unseen) {
     std::copy_n(kept.pair.begin(), count, job.bins->pairs.begin() + begin);
