@@ -75,6 +75,7 @@ std::vector<Eigen::Vector3f> ReadPoints(const fs::path& path) {
 /// How nanoflann sees the points.
 struct Cloud {
   std::span<const Eigen::Vector3f> points;
+  // NOLINTBEGIN(readability-identifier-naming): nanoflann gives these names.
   std::size_t kdtree_get_point_count() const { return points.size(); }
   float kdtree_get_pt(std::size_t i, std::size_t axis) const {
     return points[i][static_cast<Eigen::Index>(axis)];
@@ -83,6 +84,7 @@ struct Cloud {
   bool kdtree_get_bbox(Box& /*box*/) const {
     return false;
   }
+  // NOLINTEND(readability-identifier-naming)
 };
 
 /// The nearest points of a cloud, the query itself among them if it is one.

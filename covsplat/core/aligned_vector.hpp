@@ -16,14 +16,17 @@ struct CacheLineAllocator {
 
   CacheLineAllocator() = default;
   template <class U>
-  CacheLineAllocator(const CacheLineAllocator<U>& /*other*/) {}  // NOLINT: allocators convert
+  CacheLineAllocator(const CacheLineAllocator<U>& /*other*/) {
+  }  // NOLINT(google-explicit-constructor)
 
+  // NOLINTBEGIN(readability-identifier-naming): the standard gives these names.
   T* allocate(std::size_t count) {
     return static_cast<T*>(::operator new(count * sizeof(T), std::align_val_t(kCacheLineBytes)));
   }
   void deallocate(T* data, std::size_t /*count*/) {
     ::operator delete(data, std::align_val_t(kCacheLineBytes));
   }
+  // NOLINTEND(readability-identifier-naming)
   template <class U>
   bool operator==(const CacheLineAllocator<U>& /*other*/) const {
     return true;
