@@ -16,8 +16,8 @@ struct CacheLineAllocator {
 
   CacheLineAllocator() = default;
   template <class U>
-  CacheLineAllocator(const CacheLineAllocator<U>& /*other*/) {
-  }  // NOLINT(google-explicit-constructor)
+  // NOLINTNEXTLINE(google-explicit-constructor): allocators convert
+  CacheLineAllocator(const CacheLineAllocator<U>& /*other*/) {}
 
   // NOLINTBEGIN(readability-identifier-naming): the standard gives these names.
   T* allocate(std::size_t count) {
