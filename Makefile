@@ -1,6 +1,6 @@
 # The short way to everything; CMake presets do the work.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test cuda bench bench-peers bench-ablation bench-growth bench-loops bench-loop-seeds oracles check-map format tidy docs clean
+.PHONY: help setup demo test cuda bench bench-instructions bench-peers bench-ablation bench-growth bench-loops bench-loop-seeds oracles check-map format tidy docs clean
 
 COVSPLAT_DATA ?= ../shared/data
 THREADS ?= 2
@@ -37,6 +37,10 @@ bench: setup build-release  ## Run the benchmarks
 	@for b in build/release/bench/*_bench; do \
 	  if [ -x "$$b" ]; then echo "$$b" && "$$b" || exit 1; fi; \
 	done
+
+bench-instructions: setup build-release  ## Fail if a hot kernel takes more instructions than recorded
+	@tools/setup.sh --with-dev
+	tools/count_instructions.py build/release/bench --check bench/instructions.json
 
 # The peers need packages of PyPI; they live in .venv and nowhere else.
 .venv/peers: bench/peers/requirements.txt

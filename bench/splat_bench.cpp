@@ -1,13 +1,22 @@
 // Rendering and optimising on each backend against the number of Gaussians, on the image of a 64 x
-// 1024 sensor in the middle of a hall whose surfaces are covered evenly, so that all are in view.
+// 1024 sensor in the middle of a hall whose surfaces are covered evenly, so that all are in view;
+// and, where the recording is at hand, optimising a street.
+#include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
+#include <optional>
 
+#include "bench/recorded_street.hpp"
 #include <benchmark/benchmark.h>
 
 #include "covsplat/core/rng.hpp"
+#include "covsplat/splat/compact_view.hpp"
+#include "covsplat/splat/cpu/rasterizer.hpp"
 #include "covsplat/splat/cuda/device_info.hpp"
 #include "covsplat/splat/engine.hpp"
+#include "covsplat/splat/surface_normals.hpp"
 
 namespace covsplat {
 namespace {
@@ -113,6 +122,101 @@ void BM_DeviceCopy(benchmark::State& state) {
   for (auto _ : state) state.counters["B/s"] = cuda::MeasureCopyBandwidth();
 }
 
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+MomentColumns<float> FreshMoments(std::size_t size) {
+  MomentColumns<float> moments;
+  moments.Resize(size);
+  for (int c = 0; c < kMomentCount; ++c) {
+    std::fill_n(moments.Column(c), size + kBlockSize, FreshMoment(c));
+  }
+  return moments;
+}
+
+const SE3 kStreetPose{Eigen::Quaterniond(0.9, 0.1, -0.2, 0.4), Eigen::Vector3d(30.0, -20.0, 1.0)};
+
+/// One view of the street, from the same surfels every time: the time per step.
+void BM_StreetStep(benchmark::State& state, const RecordedStreet& street, Backend backend) {
+  ThreadPool pool(static_cast<int>(state.range(0)));
+  const auto surfels =
+      street.Surfels(static_cast<std::size_t>(state.range(1)), static_cast<double>(state.range(2)));
+  auto engine = MakeSplatEngine(backend, street.Sensor(), {}, pool).value();
+  const int anchor = engine->AddAnchor(kStreetPose);
+  engine->SetView(anchor, street.Measurement());
+  StepReport report;
+  for (auto _ : state) {
+    engine->Keep(std::vector<std::uint8_t>(engine->Gaussians().Size(), 0));
+    engine->Append(anchor, surfels);
+    const auto begin = Clock::now();
+    for (int i = 0; i < kStepsPerView; ++i) report = engine->Step(anchor, true);
+    state.SetIterationTime(SecondsSince(begin) / kStepsPerView);
+  }
+  const auto pairs = static_cast<double>(report.pairs);
+  state.counters["pairs"] = pairs;
+  state.counters["pairs/surfel"] = pairs / static_cast<double>(surfels.Size());
+}
+
+/// The stages of such a step on the CPU: milliseconds per view for what is done once for each, per
+/// step for the rest; the least of all iterations.
+void BM_StreetStages(benchmark::State& state, const RecordedStreet& street) {
+  ThreadPool pool(static_cast<int>(state.range(0)));
+  const auto surfels =
+      street.Surfels(static_cast<std::size_t>(state.range(1)), static_cast<double>(state.range(2)));
+  const EngineConfig config;
+  Rasterizer<float> rasterizer(street.Sensor(), config.raster, pool);
+  const CompactView view(rasterizer.View(), street.Sensor().MaxRange(), street.Measurement());
+  TileTargets<float> targets;
+  const auto time = [&](const char* stage, auto&& run) {
+    const auto begin = Clock::now();
+    run();
+    const double milliseconds = 1e3 * SecondsSince(begin);
+    const auto known = state.counters.find(stage);
+    if (known == state.counters.end() || known->second > milliseconds) {
+      state.counters[stage] = milliseconds;
+    }
+  };
+  for (auto _ : state) {
+    auto gaussians = surfels;
+    MomentColumns<float> moments = FreshMoments(gaussians.Size());
+    const std::vector<AnchorRange> ranges{{0, 0, gaussians.Size()}};
+    const std::vector<SE3> poses{kStreetPose};
+    time("expand", [&] { view.Expand(targets); });
+    time("look", [&] { rasterizer.LookFrom(kStreetPose, gaussians, ranges, poses); });
+    time("render", [&] { rasterizer.Render(); });
+    time("normals", [&] {
+      FindSurfaceNormals(
+          rasterizer.View(), rasterizer.Images(), config.loss.min_alpha, pool, targets);
+    });
+    for (int i = 0; i < kStepsPerView; ++i) {
+      if (i > 0) time("project", [&] { rasterizer.Refresh(gaussians); });
+      time("tiles", [&] { rasterizer.StepLoss(targets, config.loss, nullptr); });
+      time("optimize",
+           [&] { rasterizer.Optimize(gaussians, moments, config.loss, config.optimizer); });
+    }
+  }
+}
+
+void RegisterStreet(const RecordedStreet& street) {
+  const auto add = [](benchmark::internal::Benchmark* bench) {
+    bench->ArgNames({"threads", "surfels", "footprint"})->Unit(benchmark::kMillisecond);
+    for (const std::int64_t threads : {1, 2}) {
+      for (const std::int64_t footprint : {1, 2, 3}) bench->Args({threads, 100000, footprint});
+      for (const std::int64_t surfels : {50000, 200000}) bench->Args({threads, surfels, 2});
+    }
+    return bench;
+  };
+  add(benchmark::RegisterBenchmark("BM_StreetStep/cpu", [&](benchmark::State& state) {
+    BM_StreetStep(state, street, Backend::kCpu);
+  }))->UseManualTime();
+  add(benchmark::RegisterBenchmark("BM_StreetStages/cpu", [&](benchmark::State& state) {
+    BM_StreetStages(state, street);
+  }))->UseRealTime();
+}
+
 void Register(const std::string& name, Backend backend) {
   for (auto* bench :
        {benchmark::RegisterBenchmark(("BM_Render/" + name).c_str(), BM_Render, backend),
@@ -131,6 +235,12 @@ int main(int argc, char** argv) {
     benchmark::AddCustomContext("device", *device);
     Register("cuda", Backend::kCuda);
     benchmark::RegisterBenchmark("BM_DeviceCopy", BM_DeviceCopy)->Iterations(1);
+  }
+  const std::optional<RecordedStreet> street = RecordedStreet::Load();
+  if (street) {
+    RegisterStreet(*street);
+  } else {
+    std::fputs("no kitti_raw_0005: no street; set COVSPLAT_DATA\n", stderr);
   }
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();

@@ -11,7 +11,7 @@ packages=(
 )
 for argument in "$@"; do
   case "$argument" in
-    --with-dev) packages+=(clang-format-14 clang-tidy-14) ;;
+    --with-dev) packages+=(clang-format-14 clang-tidy-14 valgrind) ;;
     --with-poisson) packages+=(libopen3d-dev) ;;
     --with-python) packages+=(python3-venv libusb-1.0-0 libgl1 libgomp1) ;;  # what Open3D's wheel asks for
     *) echo "usage: tools/setup.sh [--with-dev] [--with-poisson] [--with-python]" >&2; exit 2 ;;

@@ -30,25 +30,27 @@ inline constexpr std::size_t kLanes = hn::MaxLanes(Tag<S>());
 template <class S>
 inline constexpr std::size_t kParts = 16 / kLanes<S>;
 
-template <class S>
+/// kCount packs side by side take the same operations: their chains of dependent instructions
+/// interleave, which keeps the processor busy where one chain would make it wait.
+template <class S, std::size_t kCount = 1>
 struct Pack {
-  hn::Vec<Tag<S>> part[kParts<S>];
+  hn::Vec<Tag<S>> part[kCount * kParts<S>];
 };
 
-template <class S>
+template <class S, std::size_t kCount = 1>
 struct PackMask {
-  hn::Mask<Tag<S>> part[kParts<S>];
+  hn::Mask<Tag<S>> part[kCount * kParts<S>];
 };
 
 // Element-wise operations. Macros only because each is the same loop around one Highway call.
-#define COVSPLAT_PACK_BINARY(NAME, OP)                          \
-  template <class S>                                            \
-  HWY_INLINE Pack<S> NAME(const Pack<S>& a, const Pack<S>& b) { \
-    Pack<S> r;                                                  \
-    for (std::size_t i = 0; i < kParts<S>; ++i) {               \
-      r.part[i] = hn::OP(a.part[i], b.part[i]);                 \
-    }                                                           \
-    return r;                                                   \
+#define COVSPLAT_PACK_BINARY(NAME, OP)                                                  \
+  template <class S, std::size_t kCount>                                                \
+  HWY_INLINE Pack<S, kCount> NAME(const Pack<S, kCount>& a, const Pack<S, kCount>& b) { \
+    Pack<S, kCount> r;                                                                  \
+    for (std::size_t i = 0; i < kCount * kParts<S>; ++i) {                              \
+      r.part[i] = hn::OP(a.part[i], b.part[i]);                                         \
+    }                                                                                   \
+    return r;                                                                           \
   }
 COVSPLAT_PACK_BINARY(operator+, Add)
 COVSPLAT_PACK_BINARY(operator-, Sub)
@@ -56,30 +58,31 @@ COVSPLAT_PACK_BINARY(operator*, Mul)
 COVSPLAT_PACK_BINARY(operator/, Div)
 COVSPLAT_PACK_BINARY(Min, Min)
 COVSPLAT_PACK_BINARY(Max, Max)
+COVSPLAT_PACK_BINARY(CopySign, CopySign)
 #undef COVSPLAT_PACK_BINARY
 
-#define COVSPLAT_PACK_UNARY(NAME, OP)             \
-  template <class S>                              \
-  HWY_INLINE Pack<S> NAME(const Pack<S>& a) {     \
-    Pack<S> r;                                    \
-    for (std::size_t i = 0; i < kParts<S>; ++i) { \
-      r.part[i] = hn::OP(a.part[i]);              \
-    }                                             \
-    return r;                                     \
+#define COVSPLAT_PACK_UNARY(NAME, OP)                         \
+  template <class S, std::size_t kCount>                      \
+  HWY_INLINE Pack<S, kCount> NAME(const Pack<S, kCount>& a) { \
+    Pack<S, kCount> r;                                        \
+    for (std::size_t i = 0; i < kCount * kParts<S>; ++i) {    \
+      r.part[i] = hn::OP(a.part[i]);                          \
+    }                                                         \
+    return r;                                                 \
   }
 COVSPLAT_PACK_UNARY(operator-, Neg)
 COVSPLAT_PACK_UNARY(Abs, Abs)
 COVSPLAT_PACK_UNARY(Sqrt, Sqrt)
 #undef COVSPLAT_PACK_UNARY
 
-#define COVSPLAT_PACK_COMPARE(NAME, OP)                             \
-  template <class S>                                                \
-  HWY_INLINE PackMask<S> NAME(const Pack<S>& a, const Pack<S>& b) { \
-    PackMask<S> r;                                                  \
-    for (std::size_t i = 0; i < kParts<S>; ++i) {                   \
-      r.part[i] = hn::OP(a.part[i], b.part[i]);                     \
-    }                                                               \
-    return r;                                                       \
+#define COVSPLAT_PACK_COMPARE(NAME, OP)                                                     \
+  template <class S, std::size_t kCount>                                                    \
+  HWY_INLINE PackMask<S, kCount> NAME(const Pack<S, kCount>& a, const Pack<S, kCount>& b) { \
+    PackMask<S, kCount> r;                                                                  \
+    for (std::size_t i = 0; i < kCount * kParts<S>; ++i) {                                  \
+      r.part[i] = hn::OP(a.part[i], b.part[i]);                                             \
+    }                                                                                       \
+    return r;                                                                               \
   }
 COVSPLAT_PACK_COMPARE(operator<, Lt)
 COVSPLAT_PACK_COMPARE(operator<=, Le)
@@ -88,10 +91,36 @@ COVSPLAT_PACK_COMPARE(operator>=, Ge)
 COVSPLAT_PACK_COMPARE(Equal, Eq)
 #undef COVSPLAT_PACK_COMPARE
 
-template <class S>
-HWY_INLINE Pack<S> All(S value) {
+template <std::size_t kCount = 1, class S>
+HWY_INLINE Pack<S, kCount> All(S value) {
+  Pack<S, kCount> r;
+  for (std::size_t i = 0; i < kCount * kParts<S>; ++i) r.part[i] = hn::Set(Tag<S>(), value);
+  return r;
+}
+
+/// All lanes of pack i have value(i).
+template <std::size_t kCount, class S, class Value>
+HWY_INLINE Pack<S, kCount> AllOfEach(Value&& value) {
+  Pack<S, kCount> r;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const Pack<S> all = All(value(i));
+    for (std::size_t j = 0; j < kParts<S>; ++j) r.part[i * kParts<S> + j] = all.part[j];
+  }
+  return r;
+}
+
+template <std::size_t kCount, class S>
+HWY_INLINE Pack<S, kCount> Repeat(const Pack<S>& a) {
+  Pack<S, kCount> r;
+  for (std::size_t i = 0; i < kCount * kParts<S>; ++i) r.part[i] = a.part[i % kParts<S>];
+  return r;
+}
+
+/// Pack i of kCount.
+template <class S, std::size_t kCount>
+HWY_INLINE Pack<S> Nth(const Pack<S, kCount>& a, std::size_t i) {
   Pack<S> r;
-  for (std::size_t i = 0; i < kParts<S>; ++i) r.part[i] = hn::Set(Tag<S>(), value);
+  for (std::size_t j = 0; j < kParts<S>; ++j) r.part[j] = a.part[i * kParts<S> + j];
   return r;
 }
 
@@ -116,44 +145,52 @@ HWY_INLINE void StoreMasked(const PackMask<S>& mask, const Pack<S>& a, S* HWY_RE
 }
 
 /// a * b + c.
-template <class S>
-HWY_INLINE Pack<S> MulAdd(const Pack<S>& a, const Pack<S>& b, const Pack<S>& c) {
-  Pack<S> r;
-  for (std::size_t i = 0; i < kParts<S>; ++i)
+template <class S, std::size_t kCount>
+HWY_INLINE Pack<S, kCount> MulAdd(const Pack<S, kCount>& a,
+                                  const Pack<S, kCount>& b,
+                                  const Pack<S, kCount>& c) {
+  Pack<S, kCount> r;
+  for (std::size_t i = 0; i < kCount * kParts<S>; ++i)
     r.part[i] = hn::MulAdd(a.part[i], b.part[i], c.part[i]);
   return r;
 }
 
 /// c - a * b.
-template <class S>
-HWY_INLINE Pack<S> NegMulAdd(const Pack<S>& a, const Pack<S>& b, const Pack<S>& c) {
-  Pack<S> r;
-  for (std::size_t i = 0; i < kParts<S>; ++i) {
+template <class S, std::size_t kCount>
+HWY_INLINE Pack<S, kCount> NegMulAdd(const Pack<S, kCount>& a,
+                                     const Pack<S, kCount>& b,
+                                     const Pack<S, kCount>& c) {
+  Pack<S, kCount> r;
+  for (std::size_t i = 0; i < kCount * kParts<S>; ++i) {
     r.part[i] = hn::NegMulAdd(a.part[i], b.part[i], c.part[i]);
   }
   return r;
 }
 
-template <class S>
-HWY_INLINE PackMask<S> operator&(const PackMask<S>& a, const PackMask<S>& b) {
-  PackMask<S> r;
-  for (std::size_t i = 0; i < kParts<S>; ++i) r.part[i] = hn::And(a.part[i], b.part[i]);
+template <class S, std::size_t kCount>
+HWY_INLINE PackMask<S, kCount> operator&(const PackMask<S, kCount>& a,
+                                         const PackMask<S, kCount>& b) {
+  PackMask<S, kCount> r;
+  for (std::size_t i = 0; i < kCount * kParts<S>; ++i) r.part[i] = hn::And(a.part[i], b.part[i]);
   return r;
 }
 
-template <class S>
-HWY_INLINE Pack<S> Select(const PackMask<S>& mask, const Pack<S>& yes, const Pack<S>& no) {
-  Pack<S> r;
-  for (std::size_t i = 0; i < kParts<S>; ++i) {
+template <class S, std::size_t kCount>
+HWY_INLINE Pack<S, kCount> Select(const PackMask<S, kCount>& mask,
+                                  const Pack<S, kCount>& yes,
+                                  const Pack<S, kCount>& no) {
+  Pack<S, kCount> r;
+  for (std::size_t i = 0; i < kCount * kParts<S>; ++i) {
     r.part[i] = hn::IfThenElse(mask.part[i], yes.part[i], no.part[i]);
   }
   return r;
 }
 
-template <class S>
-HWY_INLINE Pack<S> SelectOrZero(const PackMask<S>& mask, const Pack<S>& yes) {
-  Pack<S> r;
-  for (std::size_t i = 0; i < kParts<S>; ++i) {
+template <class S, std::size_t kCount>
+HWY_INLINE Pack<S, kCount> SelectOrZero(const PackMask<S, kCount>& mask,
+                                        const Pack<S, kCount>& yes) {
+  Pack<S, kCount> r;
+  for (std::size_t i = 0; i < kCount * kParts<S>; ++i) {
     r.part[i] = hn::IfThenElseZero(mask.part[i], yes.part[i]);
   }
   return r;
@@ -174,46 +211,50 @@ HWY_INLINE S SumOfLanes(const Pack<S>& a) {
 }
 
 /// 1 / a; in float one Newton step from the hardware's estimate, good to 1e-7.
-template <class S>
-HWY_INLINE Pack<S> Reciprocal(const Pack<S>& a) {
+template <class S, std::size_t kCount>
+HWY_INLINE Pack<S, kCount> Reciprocal(const Pack<S, kCount>& a) {
   if constexpr (sizeof(S) == 4) {
-    Pack<S> r;
-    for (std::size_t i = 0; i < kParts<S>; ++i) {
+    Pack<S, kCount> r;
+    for (std::size_t i = 0; i < kCount * kParts<S>; ++i) {
       const auto estimate = hn::ApproximateReciprocal(a.part[i]);
       r.part[i] = hn::Mul(estimate, hn::NegMulAdd(estimate, a.part[i], hn::Set(Tag<S>(), S(2))));
     }
     return r;
   } else {
-    return All(S(1)) / a;
+    return All<kCount>(S(1)) / a;
   }
 }
 
-/// exp(a) for -87 <= a <= 88; float: degree-6 polynomial on the fraction of a / ln 2, 1e-7
-/// relative.
-template <class S>
-HWY_INLINE Pack<S> ExpBounded(const Pack<S>& a) {
-  Pack<S> r;
-  for (std::size_t i = 0; i < kParts<S>; ++i) {
+/// 2^a for -126 <= a <= 127; float: polynomial on the fraction of a, 2e-7 relative.
+template <class S, std::size_t kCount>
+HWY_INLINE Pack<S, kCount> Exp2Bounded(const Pack<S, kCount>& a) {
+  Pack<S, kCount> r;
+  const Tag<S> d;
+  for (std::size_t i = 0; i < kCount * kParts<S>; ++i) {
     if constexpr (sizeof(S) == 4) {
-      const Tag<S> d;
       const hn::RebindToSigned<Tag<S>> di;
-      const auto scaled = hn::Mul(a.part[i], hn::Set(d, S(1.44269504088896341)));
-      const auto whole = hn::Round(scaled);
-      const auto f = hn::Sub(scaled, whole);
-      auto p = hn::Set(d, S(1.5403530e-4));
-      p = hn::MulAdd(p, f, hn::Set(d, S(1.3333558e-3)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(9.6181291e-3)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(5.5504109e-2)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(2.4022651e-1)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(6.9314718e-1)));
+      const auto whole = hn::Round(a.part[i]);
+      const auto f = hn::Sub(a.part[i], whole);
+      // Minimax for the relative error on [-1/2, 1/2], but exact at 0.
+      auto p = hn::Set(d, S(1.3276472e-3));
+      p = hn::MulAdd(p, f, hn::Set(d, S(9.6755413e-3)));
+      p = hn::MulAdd(p, f, hn::Set(d, S(5.5507133e-2)));
+      p = hn::MulAdd(p, f, hn::Set(d, S(2.4022120e-1)));
+      p = hn::MulAdd(p, f, hn::Set(d, S(6.9314697e-1)));
       p = hn::MulAdd(p, f, hn::Set(d, S(1)));
       const auto exponent = hn::ShiftLeft<23>(hn::ConvertTo(di, whole));
       r.part[i] = hn::BitCast(d, hn::Add(hn::BitCast(di, p), exponent));
     } else {
-      r.part[i] = hn::Exp(Tag<S>(), a.part[i]);
+      r.part[i] = hn::Exp(d, hn::Mul(a.part[i], hn::Set(d, S(0.69314718055994530942))));
     }
   }
   return r;
+}
+
+/// exp(a) for -87 <= a <= 88; float: 1e-6 relative at the ends, 2e-7 near 0.
+template <class S, std::size_t kCount>
+HWY_INLINE Pack<S, kCount> ExpBounded(const Pack<S, kCount>& a) {
+  return Exp2Bounded(a * All<kCount>(S(1.44269504088896341)));
 }
 
 template <class S>
@@ -276,20 +317,20 @@ HWY_INLINE hn::Vec<hn::CappedTag<S, kBlock<S>>> SumOfBlocks(D d, V v) {
   }
 }
 
-/// Sums of the lanes of 16 packs: out[k] = sum of terms[k], in an order that depends on nothing but
-/// the instruction set.
-template <class S>
-HWY_INLINE void SumEach(const Pack<S> (&terms)[16], S* HWY_RESTRICT out) {
+/// Sums of the lanes of packs, a multiple of 4: out[k] = sum of terms[k], in an order that depends
+/// on nothing but the instruction set.
+template <class S, std::size_t kCount>
+HWY_INLINE void SumEach(const Pack<S> (&terms)[kCount], S* HWY_RESTRICT out) {
   const Tag<S> d;
-  hn::Vec<Tag<S>> v[16];
-  for (std::size_t k = 0; k < 16; ++k) {
+  hn::Vec<Tag<S>> v[kCount];
+  for (std::size_t k = 0; k < kCount; ++k) {
     v[k] = terms[k].part[0];
     for (std::size_t i = 1; i < kParts<S>; ++i) v[k] = hn::Add(v[k], terms[k].part[i]);
   }
   const hn::CappedTag<S, kBlock<S>> block;
   if constexpr (sizeof(S) == 4) {
     const hn::Repartition<double, Tag<S>> wide;
-    for (std::size_t k = 0; k < 16; k += 4) {
+    for (std::size_t k = 0; k < kCount; k += 4) {
       const auto p =
           hn::Add(hn::InterleaveLower(d, v[k], v[k + 1]), hn::InterleaveUpper(d, v[k], v[k + 1]));
       const auto q = hn::Add(hn::InterleaveLower(d, v[k + 2], v[k + 3]),
@@ -301,12 +342,18 @@ HWY_INLINE void SumEach(const Pack<S> (&terms)[16], S* HWY_RESTRICT out) {
       hn::StoreU(SumOfBlocks<S>(d, sums), block, out + k);
     }
   } else {
-    for (std::size_t k = 0; k < 16; k += 2) {
+    for (std::size_t k = 0; k < kCount; k += 2) {
       const auto sums =
           hn::Add(hn::InterleaveLower(d, v[k], v[k + 1]), hn::InterleaveUpper(d, v[k], v[k + 1]));
       hn::StoreU(SumOfBlocks<S>(d, sums), block, out + k);
     }
   }
+}
+
+template <std::size_t kCount, class S>
+HWY_INLINE void StoreZeros(S* HWY_RESTRICT to) {
+  const hn::CappedTag<S, kBlock<S>> block;
+  for (std::size_t i = 0; i < kCount; i += kBlock<S>) hn::StoreU(hn::Zero(block), block, to + i);
 }
 
 /// out[j][i] = in[i][j] for 16 x 16 scalars.
@@ -340,36 +387,51 @@ HWY_INLINE void Transpose16(const S* HWY_RESTRICT in, S* HWY_RESTRICT out) {
 }
 
 // Three packs as the coordinates of 16 vectors.
-template <class S>
+template <class S, std::size_t kCount = 1>
 struct Pack3 {
-  Pack<S> x, y, z;
+  Pack<S, kCount> x, y, z;
 };
 
-template <class S>
-HWY_INLINE Pack<S> Dot(const Pack3<S>& a, const Pack3<S>& b) {
+template <class S, std::size_t kCount>
+HWY_INLINE Pack<S, kCount> Dot(const Pack3<S, kCount>& a, const Pack3<S, kCount>& b) {
   return MulAdd(a.x, b.x, MulAdd(a.y, b.y, a.z * b.z));
 }
 
-template <class S>
-HWY_INLINE Pack3<S> Cross(const Pack3<S>& a, const Pack3<S>& b) {
+template <std::size_t kCount, class S>
+HWY_INLINE Pack3<S, kCount> Repeat(const Pack3<S>& a) {
+  return {Repeat<kCount>(a.x), Repeat<kCount>(a.y), Repeat<kCount>(a.z)};
+}
+
+/// <a, b> + c.
+template <class S, std::size_t kCount>
+HWY_INLINE Pack<S, kCount> DotAdd(const Pack3<S, kCount>& a,
+                                  const Pack3<S, kCount>& b,
+                                  const Pack<S, kCount>& c) {
+  return MulAdd(a.x, b.x, MulAdd(a.y, b.y, MulAdd(a.z, b.z, c)));
+}
+
+template <class S, std::size_t kCount>
+HWY_INLINE Pack3<S, kCount> Cross(const Pack3<S, kCount>& a, const Pack3<S, kCount>& b) {
   return {NegMulAdd(a.z, b.y, a.y * b.z),
           NegMulAdd(a.x, b.z, a.z * b.x),
           NegMulAdd(a.y, b.x, a.x * b.y)};
 }
 
-template <class S>
-HWY_INLINE Pack3<S> operator+(const Pack3<S>& a, const Pack3<S>& b) {
+template <class S, std::size_t kCount>
+HWY_INLINE Pack3<S, kCount> operator+(const Pack3<S, kCount>& a, const Pack3<S, kCount>& b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
 
-template <class S>
-HWY_INLINE Pack3<S> operator*(const Pack<S>& s, const Pack3<S>& a) {
+template <class S, std::size_t kCount>
+HWY_INLINE Pack3<S, kCount> operator*(const Pack<S, kCount>& s, const Pack3<S, kCount>& a) {
   return {s * a.x, s * a.y, s * a.z};
 }
 
 /// s * a + b.
-template <class S>
-HWY_INLINE Pack3<S> MulAdd(const Pack<S>& s, const Pack3<S>& a, const Pack3<S>& b) {
+template <class S, std::size_t kCount>
+HWY_INLINE Pack3<S, kCount> MulAdd(const Pack<S, kCount>& s,
+                                   const Pack3<S, kCount>& a,
+                                   const Pack3<S, kCount>& b) {
   return {MulAdd(s, a.x, b.x), MulAdd(s, a.y, b.y), MulAdd(s, a.z, b.z)};
 }
 

@@ -7,10 +7,10 @@
 #include <span>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 #include <Eigen/Geometry>
 
+#include "covsplat/core/aligned_vector.hpp"
 #include "covsplat/splat/parameters.hpp"
 
 namespace covsplat {
@@ -32,7 +32,7 @@ class ColumnTable {
   /// Row i becomes what row old_row[i] was.
   void Gather(std::span<const std::size_t> old_row) {
     for (auto& column : columns_) {
-      std::vector<S> gathered(old_row.size() + kBlockSize);
+      AlignedVector<S> gathered(old_row.size() + kBlockSize);
       for (std::size_t i = 0; i < old_row.size(); ++i) gathered[i] = column[old_row[i]];
       column = std::move(gathered);
     }
@@ -41,7 +41,7 @@ class ColumnTable {
 
  private:
   std::size_t size_ = 0;
-  std::array<std::vector<S>, kColumns> columns_ = {};
+  std::array<AlignedVector<S>, kColumns> columns_ = {};
 };
 
 template <class S>

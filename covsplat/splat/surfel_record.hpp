@@ -1,4 +1,4 @@
-// What all backends agree on: Gaussians as a view sees them, tiles, and gradient slots. Plain data.
+// What all backends agree on: Gaussians as a view sees them, and tiles. Plain data.
 #pragma once
 
 #include <cstddef>
@@ -54,24 +54,12 @@ struct TileBox {
   std::int16_t y1 = -1;
 };
 
+inline bool IsEmpty(const TileBox& box) { return box.x1 < box.x0 || box.y1 < box.y0; }
+
 /// One Gaussian in one tile's list.
 struct TilePair {
   std::uint32_t record = 0;
   std::uint32_t slot = 0;  ///< where its 16 gradient sums go; slots are ordered by record
-};
-
-/// What the 16 sums in a gradient slot are; all are linear in the ray, so that pixels just add up.
-enum GradientSum : int {
-  kSumU = 0,        ///< 3: with respect to u
-  kSumV = 3,        ///< 3: with respect to v
-  kSumNormal = 6,   ///< 3: with respect to n
-  kSumPlane = 9,    ///< <n, c>
-  kSumUC = 10,      ///< <u, c>
-  kSumVC = 11,      ///< <v, c>
-  kSumAlpha = 12,   ///< alpha * d/d alpha
-  kSumColumn = 13,  ///< of the centre
-  kSumRow = 14,     ///< of the centre
-  kSumRange = 15    ///< of the centre
 };
 
 }  // namespace covsplat

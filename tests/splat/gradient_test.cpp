@@ -96,9 +96,11 @@ class Scene {
     return Collected();
   }
 
-  GradientColumns<double> Gradient(const TileTargets<double>& targets, const LossConfig& loss) {
+  GradientColumns<double> Gradient(const TileTargets<double>& targets,
+                                   const LossConfig& loss,
+                                   const TileGradients<double>* upstream = nullptr) {
     Look(table);
-    rasterizer.StepLoss(targets, loss, nullptr);
+    rasterizer.StepLoss(targets, loss, upstream);
     return Collected();
   }
 
@@ -387,6 +389,27 @@ TEST(RasterizerGradient, WhatOnlyTheFilterShowsDoesNotLearn) {
   EXPECT_NE(without.Column(kTangentOpacityLogit)[0], 0.0);
   for (int tangent = 0; tangent < kTangentCount; ++tangent) {
     EXPECT_EQ(without.Column(tangent)[1], 0.0) << tangent;
+  }
+}
+
+TEST(RasterizerGradient, LearningFromSurfacesOnlyIsTheSameWithoutImages) {
+  // Without a gradient from outside, a loss of surfaces takes a shorter way through the tiles.
+  Scene scene(SmoothConfig(), kPi, SomeAnchor());
+  const TileTargets<double> targets = MakeTargets(scene);
+  TileGradients<double> nothing;
+  nothing.Resize(scene.rasterizer.View().Tiles());
+  const LossConfig loss;
+  ASSERT_FALSE(loss.through_filter);
+  const GradientColumns<double> shorter = scene.Gradient(targets, loss);
+  const GradientColumns<double> whole = scene.Gradient(targets, loss, &nothing);
+  for (int tangent = 0; tangent < kTangentCount; ++tangent) {
+    int learns = 0;
+    for (std::size_t i = 0; i < scene.table.Size(); ++i) {
+      const double expected = whole.Column(tangent)[i];
+      EXPECT_NEAR(shorter.Column(tangent)[i], expected, 1e-12 * std::abs(expected)) << i;
+      learns += expected != 0.0;
+    }
+    EXPECT_GT(learns, 10) << tangent;
   }
 }
 

@@ -1,6 +1,8 @@
 #include "covsplat/splat/cpu/binning.hpp"
 
 #include <array>
+#include <numeric>
+#include <utility>
 
 namespace covsplat {
 namespace {
@@ -9,12 +11,8 @@ constexpr int kKeyBits = 22;  // 0.03 mm at 120 m: finer than ranges are known
 constexpr int kDigitBits = 11;
 constexpr std::uint32_t kDigits = 1u << kDigitBits;
 
-bool IsEmpty(const TileBox& box) { return box.x1 < box.x0 || box.y1 < box.y0; }
-
-std::uint32_t TileCount(const TileBox& box) {
-  return IsEmpty(box) ? 0u
-                      : static_cast<std::uint32_t>((box.x1 - box.x0 + 1) * (box.y1 - box.y0 + 1));
-}
+/// Records that one task counts and scatters; few tasks, as each has its own counts of all tiles.
+constexpr std::size_t kRecordsPerChunk = 16384;
 
 int WrapTile(int x, int tile_columns) {
   return x < 0 ? x + tile_columns : x >= tile_columns ? x - tile_columns : x;
@@ -33,8 +31,9 @@ void TileBinner::Bin(const ViewGeometry<S>& view,
     order_.push_back(
         {static_cast<std::uint32_t>(records[i].range * keys_per_m), static_cast<std::uint32_t>(i)});
   }
+  records_ = records.size();
+  bins_.slot_begin.clear();
   SortByKey();
-  CountSlots(boxes);
   Scatter(view.tile_columns, view.tile_rows, boxes);
 }
 
@@ -57,39 +56,62 @@ void TileBinner::SortByKey() {
   }
 }
 
-void TileBinner::CountSlots(std::span<const TileBox> boxes) {
-  bins_.slot_begin.resize(boxes.size() + 1);
+void TileBinner::Scatter(int tile_columns, int tile_rows, std::span<const TileBox> boxes) {
+  const auto tiles = static_cast<std::size_t>(tile_columns) * static_cast<std::size_t>(tile_rows);
+  const std::size_t chunks = (order_.size() + kRecordsPerChunk - 1) / kRecordsPerChunk;
+  cursor_.assign(tiles * chunks, 0);
+  // visit(record, where the chunk's number for the tile is) for every pair.
+  const auto for_each_pair = [&](auto&& visit) {
+    ParallelFor(pool_, order_.size(), kRecordsPerChunk, [&](std::size_t begin, std::size_t end) {
+      std::uint32_t* cursor = cursor_.data() + tiles * (begin / kRecordsPerChunk);
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::uint32_t record = order_[i].record;
+        const TileBox& box = boxes[record];
+        for (int y = box.y0; y <= box.y1; ++y) {
+          for (int x = box.x0; x <= box.x1; ++x) {
+            visit(record, cursor[y * tile_columns + WrapTile(x, tile_columns)]);
+          }
+        }
+      }
+    });
+  };
+  for_each_pair([](std::uint32_t /*record*/, std::uint32_t& count) { ++count; });
+  PlaceChunks(tiles, chunks);
+  for_each_pair([&](std::uint32_t record, std::uint32_t& next) {
+    bins_.pairs[next++] = {record, 0};
+  });
+}
+
+void TileBinner::PlaceChunks(std::size_t tiles, std::size_t chunks) {
+  bins_.tile_begin.resize(tiles);
+  bins_.tile_end.resize(tiles);
   std::uint32_t sum = 0;
-  for (std::size_t i = 0; i < boxes.size(); ++i) {
-    bins_.slot_begin[i] = sum;
-    sum += TileCount(boxes[i]);
+  for (std::size_t tile = 0; tile < tiles; ++tile) {
+    bins_.tile_begin[tile] = sum;
+    for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+      sum += std::exchange(cursor_[tiles * chunk + tile], sum);
+    }
+    bins_.tile_end[tile] = sum;
   }
-  bins_.slot_begin[boxes.size()] = sum;
   bins_.pairs.resize(sum);
 }
 
-void TileBinner::Scatter(int tile_columns, int tile_rows, std::span<const TileBox> boxes) {
-  const auto tiles = static_cast<std::size_t>(tile_columns) * static_cast<std::size_t>(tile_rows);
-  cursor_.assign(tiles + 1, 0);
-  const auto for_each_tile = [&](const TileBox& box, auto&& visit) {
-    for (int y = box.y0; y <= box.y1; ++y) {
-      for (int x = box.x0; x <= box.x1; ++x) {
-        visit(static_cast<std::size_t>(y * tile_columns + WrapTile(x, tile_columns)));
+void TileBinner::AssignSlots() {
+  const auto for_each_pair = [&](auto&& visit) {
+    for (std::size_t tile = 0; tile < bins_.tile_begin.size(); ++tile) {
+      for (std::uint32_t k = bins_.tile_begin[tile]; k < bins_.tile_end[tile]; ++k) {
+        visit(bins_.pairs[k]);
       }
     }
   };
-  for (const KeyedRecord& item : order_) {
-    for_each_tile(boxes[item.record], [&](std::size_t tile) { ++cursor_[tile + 1]; });
-  }
-  for (std::size_t tile = 0; tile < tiles; ++tile) cursor_[tile + 1] += cursor_[tile];
-  bins_.tile_begin.assign(cursor_.begin(), cursor_.end() - 1);
-  for (const KeyedRecord& item : order_) {
-    std::uint32_t slot = bins_.slot_begin[item.record];
-    for_each_tile(boxes[item.record], [&](std::size_t tile) {
-      bins_.pairs[cursor_[tile]++] = {item.record, slot++};
-    });
-  }
-  bins_.tile_end.assign(cursor_.begin(), cursor_.end() - 1);
+  // Counted two places ahead, then summed up, slot_begin[record + 1] is where the record begins,
+  // and has moved on to where it ends when all its pairs have taken their slots.
+  std::vector<std::uint32_t>& next = bins_.slot_begin;
+  next.assign(records_ + 2, 0);
+  for_each_pair([&](const TilePair& pair) { ++next[pair.record + 2]; });
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  for_each_pair([&](TilePair& pair) { pair.slot = next[pair.record + 1]++; });
+  next.pop_back();
 }
 
 template void TileBinner::Bin(const ViewGeometry<float>&,

@@ -1,6 +1,7 @@
 // Binning: which Gaussians each tile has to blend, front to back.
 #pragma once
 
+#include "covsplat/core/parallel.hpp"
 #include "covsplat/splat/cpu/raster_data.hpp"
 
 namespace covsplat {
@@ -10,11 +11,17 @@ namespace covsplat {
 /// are kept from call to call.
 class TileBinner {
  public:
-  /// `boxes` and `records`: one per record. Result in Bins().
+  explicit TileBinner(ThreadPool& pool) : pool_(pool) {}
+
+  /// `boxes` and `records`: one per record. Result in Bins(), without slots.
   template <class S>
   void Bin(const ViewGeometry<S>& view,
            std::span<const SurfelRecord<S>> records,
            std::span<const TileBox> boxes);
+
+  /// Gives the pairs that are in the tiles' lists their slots, ordered by record, then by tile.
+  /// Best when what no pixel sees has been dropped: slots are then few and lie close together.
+  void AssignSlots();
 
   const TileBins& Bins() const { return bins_; }
   /// For dropping pairs that turn out to be invisible.
@@ -22,18 +29,21 @@ class TileBinner {
 
  private:
   void SortByKey();
-  void CountSlots(std::span<const TileBox> boxes);
   void Scatter(int tile_columns, int tile_rows, std::span<const TileBox> boxes);
+  /// Turns the counts of `cursor_` into where each chunk writes its first pair in each tile.
+  void PlaceChunks(std::size_t tiles, std::size_t chunks);
 
   struct KeyedRecord {
     std::uint32_t key;
     std::uint32_t record;
   };
 
+  ThreadPool& pool_;
   TileBins bins_;
+  std::size_t records_ = 0;
   std::vector<KeyedRecord> order_;
   std::vector<KeyedRecord> scratch_;
-  std::vector<std::uint32_t> cursor_;
+  std::vector<std::uint32_t> cursor_;  ///< [chunks of order_ x tiles]
 };
 
 }  // namespace covsplat

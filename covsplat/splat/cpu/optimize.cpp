@@ -1,5 +1,6 @@
 #include "covsplat/splat/cpu/optimize.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -16,7 +17,7 @@ HWY_BEFORE_NAMESPACE();
 namespace covsplat::HWY_NAMESPACE {
 namespace {
 
-/// Gradient of 16 Gaussians with respect to their tangents; `seen` is 1 where a slot was written.
+/// Gradient of 16 Gaussians with respect to their tangents; `seen` is 1 where some pixel saw one.
 template <class S>
 struct BlockGradient {
   Pack3<S> mean;      ///< in the anchor's frame
@@ -26,29 +27,27 @@ struct BlockGradient {
   Pack<S> seen;
 };
 
-/// Adds up the slots of a block's Gaussians, one row of 16 sums each. False if none was written.
+/// Adds up the slots of a block's Gaussians, one row of 16 sums each. False if none was seen.
 template <class S>
 HWY_INLINE bool SumSlots(const OptimizeJob<S>& job, std::uint32_t number, S* rows, S* seen) {
-  bool any = false;
-  const GaussianBlock& block = job.blocks[number];
-  for (std::size_t lane = 0; lane < 16; ++lane) {
+  alignas(64) static constexpr S kNothing[16] = {};
+  const std::uint32_t* slot_begin = job.bins->slot_begin.data() + kBlockSize * number;
+  unsigned any = kUnseen;
+  for (std::size_t lane = 0; lane < kBlockSize; ++lane) {
     Pack<S> sum = All(S(0));
-    seen[lane] = S(0);
-    if (lane < block.count) {
-      const std::size_t record = 16 * static_cast<std::size_t>(number) + lane;
-      for (std::uint32_t slot = job.bins->slot_begin[record];
-           slot < job.bins->slot_begin[record + 1];
-           ++slot) {
-        if (job.slot_used[slot] == 0) continue;
-        job.slot_used[slot] = 0;
-        sum = sum + LoadPack(job.slots + 16 * static_cast<std::size_t>(slot));
-        seen[lane] = S(1);
-        any = true;
-      }
+    unsigned state = kUnseen;
+    for (std::uint32_t slot = slot_begin[lane]; slot < slot_begin[lane + 1]; ++slot) {
+      // Which slots are written is hard to guess: choose an address, not a branch.
+      const bool written = job.slot_state[slot] == kWritten;
+      sum = sum + LoadPack(written ? job.slots + 16 * static_cast<std::size_t>(slot) : kNothing);
+      state |= job.slot_state[slot];
     }
     StorePack(sum, rows + 16 * lane);
+    seen[lane] = state != kUnseen ? S(1) : S(0);
+    any |= state;
   }
-  return any;
+  std::fill(job.slot_state + slot_begin[0], job.slot_state + slot_begin[kBlockSize], kUnseen);
+  return any != kUnseen;
 }
 
 template <class S>
@@ -94,7 +93,8 @@ HWY_INLINE Pack3<S> FilterGradient(const ViewGeometry<S>& view,
           MulAdd(radial, centre.z, up * horizontal2)};
 }
 
-/// The chain rule from a record to the Gaussian's tangent (algorithm 7.8, fused form).
+/// The chain rule from the sums of the slots to the tangent: algorithm 7.8 in the plane's own
+/// coordinates, in which the points of rays are centre + a * axis_u + b * axis_v.
 template <class S>
 HWY_INLINE bool GradientOf(const OptimizeJob<S>& job, std::uint32_t number, BlockGradient<S>& out) {
   alignas(64) S rows[256];
@@ -103,44 +103,49 @@ HWY_INLINE bool GradientOf(const OptimizeJob<S>& job, std::uint32_t number, Bloc
   alignas(64) S seen[16];
   if (!SumSlots(job, number, rows, seen)) return false;
   Transpose16(rows, sums);
-  Transpose16(job.records[16 * static_cast<std::size_t>(number)].u, fields);
+  Transpose16(job.records[kBlockSize * static_cast<std::size_t>(number)].u, fields);
+  const auto sum = [&](int k) { return LoadPack(sums + 16 * k); };
+  const Pack<S> one = All(S(1));
+  // Lanes that were not seen may hold anything: keep their arithmetic finite.
+  out.seen = LoadPack(seen);
   const Pack3<S> u = Field3(fields, 0);
   const Pack3<S> v = Field3(fields, 3);
   const Pack3<S> n = Field3(fields, 6);
-  const Pack<S> zero = All(S(0));
-  // Lanes that were not seen may hold anything: keep their arithmetic finite.
-  out.seen = LoadPack(seen);
-  const auto used = out.seen > zero;
   const Pack<S> plane = LoadPack(fields + 16 * 9);
-  const Pack<S> u_c = LoadPack(fields + 16 * 10);
-  const Pack<S> v_c = LoadPack(fields + 16 * 11);
-  const Pack<S> inverse_u2 = All(S(1)) / Max(Dot(u, u), All(S(1e-20)));
-  const Pack<S> inverse_v2 = All(S(1)) / Max(Dot(v, v), All(S(1e-20)));
-  // The centre from its coordinates along the orthogonal axes: u = r_u / s_u.
-  const Pack3<S> centre = MulAdd(u_c * inverse_u2, u, MulAdd(v_c * inverse_v2, v, plane * n));
-  const Pack<S> sum_plane = LoadPack(sums + 16 * kSumPlane);
-  const Pack<S> sum_uc = LoadPack(sums + 16 * kSumUC);
-  const Pack<S> sum_vc = LoadPack(sums + 16 * kSumVC);
-  const Pack3<S> g_u = MulAdd(sum_uc, centre, Field3(sums, kSumU));
-  const Pack3<S> g_v = MulAdd(sum_vc, centre, Field3(sums, kSumV));
-  const Pack3<S> g_n = MulAdd(sum_plane, centre, Field3(sums, kSumNormal));
-  const Pack3<S> g_filter = FilterGradient(*job.view,
-                                           centre,
-                                           LoadPack(sums + 16 * kSumColumn),
-                                           LoadPack(sums + 16 * kSumRow),
-                                           LoadPack(sums + 16 * kSumRange));
-  const Pack3<S> g_centre = MulAdd(sum_uc, u, MulAdd(sum_vc, v, MulAdd(sum_plane, n, g_filter)));
-  const Pack3<S> torque = Cross(u, g_u) + Cross(v, g_v) + Cross(n, g_n);
+  const Pack<S> scale_u = one / Sqrt(Max(Dot(u, u), All(S(1e-20))));
+  const Pack<S> scale_v = one / Sqrt(Max(Dot(v, v), All(S(1e-20))));
+  const Pack3<S> r_u = scale_u * u;
+  const Pack3<S> r_v = scale_v * v;
+
+  Pack3<S> g_centre = MulAdd(sum(kSlotA), u, sum(kSlotB) * v);
+  const Pack<S> inverse_plane = one / Select(Equal(plane, All(S(0))), one, plane);
+  g_centre = MulAdd(sum(kSlotTravel) * inverse_plane, n, g_centre);
+  const Pack<S> g_column = sum(kSlotColumn);
+  const Pack<S> g_row = sum(kSlotRow);
+  const Pack<S> g_range = sum(kSlotRange);
+  const Pack<S> filter = Max(Max(Abs(g_column), Abs(g_row)), Abs(g_range));
+  if (!None(filter > All(S(0)))) {
+    const Pack<S> u_c = scale_u * LoadPack(fields + 16 * 10);
+    const Pack<S> v_c = scale_v * LoadPack(fields + 16 * 11);
+    const Pack3<S> centre = MulAdd(u_c, r_u, MulAdd(v_c, r_v, plane * n));
+    g_centre = g_centre + FilterGradient(*job.view, centre, g_column, g_row, g_range);
+  }
+
+  // The normal's gradient is g_normal less what tilting the plane does to the points on it.
+  const Pack3<S> g_normal = Field3(sums, kSlotNormal);
+  const Pack<S> tilt_u = scale_u * sum(kSlotTravelA) * inverse_plane;
+  const Pack<S> tilt_v = scale_v * sum(kSlotTravelB) * inverse_plane;
+  const Pack<S> facing = CopySign(one, Dot(Cross(r_u, r_v), n));  // n may be -r_u x r_v
+  out.rotation = {facing * (tilt_v - Dot(r_v, g_normal)),
+                  facing * (Dot(r_u, g_normal) - tilt_u),
+                  sum(kSlotAB) * (scale_u / scale_v - scale_v / scale_u)};
+  out.log_scale_u = sum(kSlotAA);
+  out.log_scale_v = sum(kSlotBB);
+  const Pack<S> opacity = LoadPack(fields + 16 * 12);
+  out.opacity_logit = sum(kSlotAlpha) * (one - opacity);
   const S* rotation = job.transforms[job.blocks[number].transform].rotation;
   out.mean = RotateBack(rotation, g_centre);
   out.normal = RotateBack(rotation, n);
-  const Pack3<S> r_u = Sqrt(inverse_u2) * u;
-  const Pack3<S> r_v = Sqrt(inverse_v2) * v;
-  out.rotation = {Dot(r_u, torque), Dot(r_v, torque), Dot(Cross(r_u, r_v), torque)};
-  out.log_scale_u = SelectOrZero(used, -Dot(u, g_u));
-  out.log_scale_v = SelectOrZero(used, -Dot(v, g_v));
-  const Pack<S> opacity = LoadPack(fields + 16 * 12);
-  out.opacity_logit = LoadPack(sums + 16 * kSumAlpha) * (All(S(1)) - opacity);
   return true;
 }
 

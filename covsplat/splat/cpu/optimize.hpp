@@ -21,7 +21,7 @@ struct OptimizeJob {
   const SurfelRecord<S>* records = nullptr;
   const TileBins* bins = nullptr;
   const S* slots = nullptr;
-  std::uint8_t* slot_used = nullptr;
+  SlotState* slot_state = nullptr;
 
   // Optimising: moments, loss (for the scale term) and steps. Gradients only: `gradients`.
   MomentColumns<S>* moments = nullptr;
@@ -31,11 +31,11 @@ struct OptimizeJob {
 };
 
 /// Sums each Gaussian's slots in order and takes one Adam step with those that some pixel saw; all
-/// others stay as they are. Clears `slot_used`.
+/// others stay as they are. Clears `slot_state`.
 template <class S>
 void OptimizeBlocks(const OptimizeJob<S>& job, std::span<const std::uint32_t> block_numbers);
 
-/// Writes the gradients of the blocks' Gaussians to `job.gradients`. Clears `slot_used`.
+/// Writes the gradients of the blocks' Gaussians to `job.gradients`. Clears `slot_state`.
 template <class S>
 void CollectGradients(const OptimizeJob<S>& job, std::span<const std::uint32_t> block_numbers);
 

@@ -227,22 +227,23 @@ HWY_INLINE void ProjectBlock(const ProjectJob<S>& job, std::uint32_t number) {
   const Pack<S> row = RowOf(view, Atan2(s.centre.z, horizontal));
   const Pack3<S> u = (All(S(1)) / s.scale_u) * s.axis_u;
   const Pack3<S> v = (All(S(1)) / s.scale_v) * s.axis_v;
+  // What a ray may add with weight zero must be finite, whatever the parameters are.
   const Pack<S> fields[16] = {u.x,
                               u.y,
                               u.z,
                               v.x,
                               v.y,
                               v.z,
-                              s.normal.x,
-                              s.normal.y,
-                              s.normal.z,
+                              SelectOrZero(visible, s.normal.x),
+                              SelectOrZero(visible, s.normal.y),
+                              SelectOrZero(visible, s.normal.z),
                               plane,
                               Dot(u, s.centre),
                               Dot(v, s.centre),
                               SelectOrZero(visible, s.opacity),
                               column,
                               row,
-                              range};
+                              SelectOrZero(visible, range)};
   SurfelRecord<S>* records = job.records + 16 * number;
   StoreRecords(fields, records);
   if (job.boxes == nullptr) return;

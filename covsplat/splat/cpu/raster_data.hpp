@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "covsplat/core/aligned_vector.hpp"
 #include "covsplat/core/se3.hpp"
 #include "covsplat/core/sensor_model.hpp"
 #include "covsplat/splat/gaussians.hpp"
@@ -30,8 +31,8 @@ struct ViewGeometry {
 
   // Rays are separable: (cos el cos az, cos el sin az, sin el), 16 values for each tile column or
   // tile row. Lanes below the last image row repeat it and are masked by missing targets.
-  std::vector<S> cos_azimuth, sin_azimuth;      ///< [tile_columns x 16]
-  std::vector<S> cos_elevation, sin_elevation;  ///< [tile_rows x 16]
+  AlignedVector<S> cos_azimuth, sin_azimuth;      ///< [tile_columns x 16]
+  AlignedVector<S> cos_elevation, sin_elevation;  ///< [tile_rows x 16]
 
   std::vector<S> row_table;
   S row_table_origin_rad;
@@ -57,7 +58,35 @@ struct TileBins {
   std::vector<std::uint32_t> tile_begin;  ///< [tiles] into pairs
   std::vector<std::uint32_t> tile_end;    ///< [tiles]
   std::vector<TilePair> pairs;
-  std::vector<std::uint32_t> slot_begin;  ///< [records + 1]
+  std::vector<std::uint32_t> slot_begin;  ///< [records + 1]; empty: slots are not assigned yet
+};
+
+/// What a pass over the tiles left in the slot of a pair.
+enum SlotState : std::uint8_t {
+  kUnseen = 0,   ///< nothing: no pixel sees the Gaussian
+  kSeen = 1,     ///< nothing: pixels see it, but have no gradient for it
+  kWritten = 3,  ///< the sums
+};
+
+/// What the 16 sums in a gradient slot are: moments over the points where the tile's rays meet the
+/// plane of the Gaussian. (a, b) is such a point in units of the scales; with w = alpha *
+/// transmittance, g_alpha = alpha * dL/d alpha and `travel` = t * dL/dt for the range t of the
+/// point. All that a Gaussian's parameters do to its points is linear in these.
+enum SlotSum : int {
+  kSlotAlpha = 0,    ///< g_alpha, of rays that meet the screen-space filter as well
+  kSlotA = 1,        ///< g_alpha * a
+  kSlotB = 2,        ///< g_alpha * b
+  kSlotAA = 3,       ///< g_alpha * a * a
+  kSlotAB = 4,       ///< g_alpha * a * b
+  kSlotBB = 5,       ///< g_alpha * b * b
+  kSlotTravel = 6,   ///< travel
+  kSlotTravelA = 7,  ///< travel * a
+  kSlotTravelB = 8,  ///< travel * b
+  kSlotNormal = 9,   ///< 3: w * dL/d normal
+  // Of rays that meet the screen-space filter:
+  kSlotColumn = 12,  ///< with respect to the column of the centre
+  kSlotRow = 13,     ///< with respect to the row of the centre
+  kSlotRange = 14,   ///< with respect to the range of the centre
 };
 
 /// Per-pixel sums of front-to-back blending (w = alpha * transmittance), tile by tile, 16 each.

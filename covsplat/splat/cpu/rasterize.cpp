@@ -21,8 +21,8 @@ namespace {
 /// the screen-space filter was met instead of the surface.
 template <class S>
 struct KeptSurfels {
-  std::vector<S> alpha;  ///< [16 x kept]
-  std::vector<S> range;  ///< [16 x kept]
+  AlignedVector<S> alpha;  ///< [16 x kept]
+  AlignedVector<S> range;  ///< [16 x kept]
   std::vector<TilePair> pair;
 
   void MakeRoom(std::size_t count) {
@@ -109,28 +109,31 @@ HWY_INLINE TileRays<S> RaysOf(const ViewGeometry<S>& view, std::size_t tile) {
   return rays;
 }
 
-/// Where the 16 rays of a tile meet one Gaussian.
-template <class S>
-struct Meeting {
-  Pack<S> u_ray, v_ray, inverse_n_ray;  ///< <u, r>, <v, r>, 1 / <n, r>
-  Pack<S> a, b;                         ///< in units of the Gaussian's scales
-  Pack<S> dx, dy;                       ///< centre - pixel, px
-};
-
 template <class S>
 HWY_INLINE Pack3<S> Broadcast(const S* v) {
   return {All(v[0]), All(v[1]), All(v[2])};
 }
 
-/// Offset of a Gaussian's centre from the tile's pixels, the short way round the turn.
+/// Column of a Gaussian's centre from the tile's corner, px, the short way round the turn.
 template <class S>
-HWY_INLINE void OffsetsTo(const SurfelRecord<S>& surfel, const TileRays<S>& rays, Meeting<S>& m) {
-  S local = surfel.column - rays.corner_column;
+HWY_INLINE S LocalColumn(const SurfelRecord<S>& surfel, const TileRays<S>& rays) {
+  const S local = surfel.column - rays.corner_column;
   const S half = S(0.5) * rays.columns;
-  local = local > half ? local - rays.columns : local < -half ? local + rays.columns : local;
-  m.dx = All(local) - rays.column;
-  m.dy = All(surfel.row - rays.corner_row) - rays.row;
+  return local > half ? local - rays.columns : local < -half ? local + rays.columns : local;
 }
+
+/// What a pass over a tile is for; it leaves out what only others need.
+enum class Pass {
+  kRender,  ///< the images
+  kLearn,   ///< the gradient of a loss that only learns from surfaces
+  kAll      ///< the images and the gradient of anything
+};
+
+/// Measured ranges of a tile's pixels, and the largest error that counts.
+template <class S>
+struct PixelRanges {
+  Pack<S> measured, cap;
+};
 
 /// Blending state of 16 pixels.
 template <class S>
@@ -138,58 +141,111 @@ struct Blend {
   Pack<S> transmittance, range_sum, median;
   Pack<S> median_entry;  ///< number of the median Gaussian among the kept ones
   Pack3<S> normal;
+  PackMask<S> open;  ///< pixels whose rays go on
+  /// Sum of w * min(|range - measured|, cap): by how much rays miss the measurement, each of the
+  /// Gaussians for itself. The mean of their ranges would also be right where what lies in front
+  /// makes up for what lies behind.
+  Pack<S> error_sum;
 };
 
 template <class S>
 HWY_INLINE Blend<S> EmptyBlend() {
   const Pack<S> zero = All(S(0));
-  return {All(S(1)), zero, zero, All(S(-1)), {zero, zero, zero}};
+  return {All(S(1)), zero, zero, All(S(-1)), {zero, zero, zero}, All(S(1)) > zero, zero};
 }
 
-/// Blends one Gaussian into the tile (algorithm: the nearer of surface and screen-space filter in
-/// standard deviations). False if no pixel sees it.
+/// Gaussians whose meetings with the rays are computed together. One where a pack needs several
+/// vectors: these already interleave, and registers are few.
 template <class S>
-HWY_INLINE bool BlendSurfel(const ViewGeometry<S>& view,
-                            const TileRays<S>& rays,
-                            const SurfelRecord<S>& s,
-                            std::size_t count,
-                            Blend<S>& blend,
-                            KeptSurfels<S>& kept) {
-  const Pack<S> n_ray = Dot(Broadcast(s.n), rays.ray);
-  const auto steep = Abs(n_ray) > All(view.grazing_cosine);
-  const Pack<S> t = All(s.plane) * Reciprocal(n_ray);
-  Meeting<S> m;
-  m.a = MulAdd(t, Dot(Broadcast(s.u), rays.ray), All(-s.u_c));
-  m.b = MulAdd(t, Dot(Broadcast(s.v), rays.ray), All(-s.v_c));
-  OffsetsTo(s, rays, m);
-  const Pack<S> surface = MulAdd(m.a, m.a, m.b * m.b);
-  const Pack<S> filter = All(view.lowpass) * MulAdd(m.dx, m.dx, m.dy * m.dy);
-  const auto on_surface = steep & (t > All(view.near_m)) & (surface <= filter);
-  const Pack<S> distance = Select(on_surface, surface, filter);
-  const Pack<S> exponent = Max(All(S(-0.5)) * distance, All(S(-80)));
-  Pack<S> alpha = Min(All(s.opacity) * ExpBounded(exponent), All(view.alpha_cap));
-  const auto seen =
-      (alpha >= All(view.alpha_min)) & (blend.transmittance > All(view.transmittance_min));
-  if (None(seen)) return false;
-  alpha = SelectOrZero(seen, alpha);
-  const Pack<S> range = Select(on_surface, t, All(s.range));
-  const auto takes_median = seen & (blend.transmittance > All(S(0.5)));
-  blend.median = Select(takes_median, range, blend.median);
-  blend.median_entry = Select(takes_median, All(static_cast<S>(count)), blend.median_entry);
+inline constexpr std::size_t kTogether = kParts<S> == 1 ? 2 : 1;
+
+/// Where the rays of a tile meet some Gaussians.
+template <class S, std::size_t kCount>
+struct Meeting {
+  Pack<S, kCount> alpha;         ///< capped, not cut
+  Pack<S, kCount> range;         ///< of the ray's point on the surface, or of the centre
+  Pack<S, kCount> signed_range;  ///< as in KeptSurfels
+};
+
+/// The nearer of surface and screen-space filter in standard deviations (algorithm 7.5).
+template <class S, std::size_t kCount>
+HWY_INLINE Meeting<S, kCount> Meet(const ViewGeometry<S>& view,
+                                   const TileRays<S>& rays,
+                                   const SurfelRecord<S>* const (&surfels)[kCount]) {
+  constexpr S kHalfLog2E = S(0.72134752044448170368);
+  const auto all = [](S value) { return All<kCount>(value); };
+  const auto each = [&](auto&& field) {
+    return AllOfEach<kCount, S>([&](std::size_t i) { return field(*surfels[i]); });
+  };
+  const auto dot_ray = [&](auto&& axis) {
+    const Pack3<S, kCount> a{each([&](const SurfelRecord<S>& s) { return axis(s)[0]; }),
+                             each([&](const SurfelRecord<S>& s) { return axis(s)[1]; }),
+                             each([&](const SurfelRecord<S>& s) { return axis(s)[2]; })};
+    return Dot(a, Repeat<kCount>(rays.ray));
+  };
+  using Record = const SurfelRecord<S>&;
+  const Pack<S, kCount> n_ray = dot_ray([](Record s) { return s.n; });
+  const auto steep = n_ray < all(-view.grazing_cosine);  // what t is positive for faces the ray
+  const Pack<S, kCount> t = each([](Record s) { return s.plane; }) * Reciprocal(n_ray);
+  const Pack<S, kCount> a =
+      MulAdd(t, dot_ray([](Record s) { return s.u; }), each([](Record s) { return -s.u_c; }));
+  const Pack<S, kCount> b =
+      MulAdd(t, dot_ray([](Record s) { return s.v; }), each([](Record s) { return -s.v_c; }));
+  const Pack<S, kCount> dx =
+      each([&](Record s) { return LocalColumn(s, rays); }) - Repeat<kCount>(rays.column);
+  const Pack<S, kCount> dy =
+      each([&](Record s) { return s.row - rays.corner_row; }) - Repeat<kCount>(rays.row);
+  const Pack<S, kCount> surface = MulAdd(a, a, b * b);
+  const Pack<S, kCount> filter = all(view.lowpass) * MulAdd(dx, dx, dy * dy);
+  const auto on_surface = steep & (t > all(view.near_m)) & (surface <= filter);
+  const Pack<S, kCount> distance = Select(on_surface, surface, filter);
+  const Pack<S, kCount> exponent = Max(all(-kHalfLog2E) * distance, all(S(-115)));
+  const Pack<S, kCount> opacity = each([](Record s) { return s.opacity; });
+  const Pack<S, kCount> range = each([](Record s) { return s.range; });
+  return {Min(opacity * Exp2Bounded(exponent), all(view.alpha_cap)),
+          Select(on_surface, t, range),
+          Select(on_surface, t, -range)};
+}
+
+/// Blends one Gaussian into the tile as number `count` of the kept ones; `met` are its values of a
+/// Meeting. Returns which pixels see it.
+template <Pass kPass, class S>
+HWY_INLINE PackMask<S> BlendSurfel(const ViewGeometry<S>& view,
+                                   const PixelRanges<S>& ranges,
+                                   const SurfelRecord<S>& s,
+                                   const Meeting<S, 1>& met,
+                                   std::size_t count,
+                                   Blend<S>& blend,
+                                   KeptSurfels<S>& kept) {
+  const auto seen = (met.alpha >= All(view.alpha_min)) & blend.open;
+  const Pack<S> alpha = SelectOrZero(seen, met.alpha);
   const Pack<S> weight = alpha * blend.transmittance;
-  blend.range_sum = MulAdd(weight, SelectOrZero(seen, range), blend.range_sum);
   blend.normal = MulAdd(weight, Broadcast(s.n), blend.normal);
+  if constexpr (kPass != Pass::kLearn) {
+    const auto takes_median = seen & (blend.transmittance > All(S(0.5)));
+    blend.median = Select(takes_median, met.range, blend.median);
+    blend.range_sum = MulAdd(weight, met.range, blend.range_sum);
+    if constexpr (kPass == Pass::kAll) {
+      blend.median_entry = Select(takes_median, All(static_cast<S>(count)), blend.median_entry);
+    }
+  }
+  if constexpr (kPass != Pass::kRender) {
+    const Pack<S> error = Min(Abs(met.range - ranges.measured), ranges.cap);
+    blend.error_sum = MulAdd(weight, error, blend.error_sum);
+    StorePack(alpha, &kept.alpha[16 * count]);
+    StorePack(met.signed_range, &kept.range[16 * count]);
+  }
   blend.transmittance = blend.transmittance - weight;
-  StorePack(alpha, &kept.alpha[16 * count]);
-  StorePack(Select(on_surface, t, All(-s.range)), &kept.range[16 * count]);
-  return true;
+  blend.open = blend.transmittance > All(view.transmittance_min);
+  return seen;
 }
 
 /// Blends a tile's list; returns how many Gaussians were kept for the way back.
-template <class S>
+template <Pass kPass, class S>
 HWY_INLINE std::size_t BlendTile(const TileJob<S>& job,
                                  std::size_t tile,
                                  const TileRays<S>& rays,
+                                 const PixelRanges<S>& ranges,
                                  Blend<S>& blend,
                                  KeptSurfels<S>& kept) {
   const std::uint32_t begin = job.bins->tile_begin[tile];
@@ -197,13 +253,21 @@ HWY_INLINE std::size_t BlendTile(const TileJob<S>& job,
   kept.MakeRoom(end - begin + 1);
   const TilePair* pairs = job.bins->pairs.data();
   std::size_t count = 0;
-  for (std::uint32_t k = begin; k < end; ++k) {
-    if (k + kPrefetchAhead < end) hwy::Prefetch(&job.records[pairs[k + kPrefetchAhead].record]);
-    const SurfelRecord<S>& surfel = job.records[pairs[k].record];
-    if (!BlendSurfel(*job.view, rays, surfel, count, blend, kept)) continue;
-    kept.pair[count] = pairs[k];
-    ++count;
-    if (None(blend.transmittance > All(job.view->transmittance_min))) break;
+  for (std::uint32_t k = begin; k < end; k += kTogether<S>) {
+    const SurfelRecord<S>* surfels[kTogether<S>];
+    for (std::uint32_t i = 0; i < kTogether<S>; ++i) {
+      surfels[i] = &job.records[pairs[std::min(k + i, end - 1)].record];
+      hwy::Prefetch(&job.records[pairs[std::min(k + i + kPrefetchAhead, end - 1)].record]);
+    }
+    const Meeting<S, kTogether<S>> met = Meet<S>(*job.view, rays, surfels);
+    for (std::uint32_t i = 0; i < kTogether<S> && k + i < end; ++i) {
+      const Meeting<S, 1> one{Nth(met.alpha, i), Nth(met.range, i), Nth(met.signed_range, i)};
+      const auto seen = BlendSurfel<kPass>(*job.view, ranges, *surfels[i], one, count, blend, kept);
+      // What is not seen is overwritten by the next one: cheaper than a branch that is often wrong.
+      kept.pair[count] = pairs[k + i];
+      count += None(seen) ? 0 : 1;
+    }
+    if (None(blend.open)) break;
   }
   if (job.drop_unseen) {
     std::copy_n(kept.pair.begin(), count, job.bins->pairs.begin() + begin);
@@ -228,34 +292,13 @@ struct ImageGradient {
   Pack<S> alpha, range_sum, median;
   Pack3<S> normal;
   Pack<S> error_sum;
-  Pack<S> measured, range_cap;  ///< that errors are taken of
-  Pack<S> hidden_from;          ///< Gaussians from this range on have no gradient
+  Pack<S> hidden_from;  ///< Gaussians from this range on have no gradient
 };
 
 template <class S>
 HWY_INLINE ImageGradient<S> NoGradient() {
   const Pack<S> zero = All(S(0));
-  return {
-      zero, zero, zero, {zero, zero, zero}, zero, zero, zero, All(std::numeric_limits<S>::max())};
-}
-
-/// Sum of w * min(|range - measured|, cap): by how much rays miss the measurement, each of the
-/// Gaussians for itself. The mean of their ranges would also be right where what lies in front
-/// makes up for what lies behind.
-template <class S>
-HWY_INLINE Pack<S> SumOfErrors(const KeptSurfels<S>& kept,
-                               std::size_t count,
-                               const Pack<S>& measured,
-                               const Pack<S>& cap) {
-  Pack<S> transmittance = All(S(1));
-  Pack<S> sum = All(S(0));
-  for (std::size_t i = 0; i < count; ++i) {
-    const Pack<S> weight = LoadPack(&kept.alpha[16 * i]) * transmittance;
-    const Pack<S> range = Abs(LoadPack(&kept.range[16 * i]));
-    sum = MulAdd(weight, Min(Abs(range - measured), cap), sum);
-    transmittance = transmittance - weight;
-  }
-  return sum;
+  return {zero, zero, zero, {zero, zero, zero}, zero, All(std::numeric_limits<S>::max())};
 }
 
 /// 1 - <N / A, target> where the target normal is known; adds to the gradient, returns the loss.
@@ -275,13 +318,12 @@ HWY_INLINE S NormalLoss(const Blend<S>& blend,
 }
 
 /// The pixel-local terms of the mapping loss (paper eqs. 10 to 12, the range of each Gaussian in
-/// place of the rendered one) and their gradients. `count`: of the kept Gaussians.
+/// place of the rendered one) and their gradients.
 template <class S>
 HWY_INLINE LossSums PixelLoss(const TileJob<S>& job,
                               std::size_t tile,
+                              const PixelRanges<S>& ranges,
                               const Blend<S>& blend,
-                              const KeptSurfels<S>& kept,
-                              std::size_t count,
                               ImageGradient<S>& g) {
   const LossConfig& loss = *job.loss;
   const TileTargets<S>& targets = *job.targets;
@@ -292,21 +334,18 @@ HWY_INLINE LossSums PixelLoss(const TileJob<S>& job,
                        static_cast<S>(std::max<std::size_t>(targets.valid_normals, 1));
   const S per_opacity = static_cast<S>(loss.opacity) * per_range;
 
-  const Pack<S> measured = LoadPack(&targets.range_m[16 * tile]);
-  const auto valid = measured > zero;
+  const auto valid = ranges.measured > zero;
   const Pack<S> alpha = one - blend.transmittance;
   const Pack<S> opaque = alpha + All(static_cast<S>(loss.opacity_epsilon));
   g.alpha = SelectOrZero(valid, All(-per_opacity) / opaque);
-  const Pack<S> hidden_from = MulAdd(measured,
+  const Pack<S> hidden_from = MulAdd(ranges.measured,
                                      All(static_cast<S>(1.0 + loss.hidden_margin_ratio)),
                                      All(static_cast<S>(loss.hidden_margin_m)));
   g.hidden_from = Select(valid, hidden_from, g.hidden_from);
 
   const auto covered = valid & (alpha > All(static_cast<S>(loss.min_alpha)));
   const Pack<S> inverse_alpha = one / Max(alpha, All(static_cast<S>(loss.min_alpha)));
-  g.measured = measured;
-  g.range_cap = All(static_cast<S>(loss.range_cap_m));
-  const Pack<S> error = SumOfErrors(kept, count, measured, g.range_cap) * inverse_alpha;
+  const Pack<S> error = blend.error_sum * inverse_alpha;
   g.error_sum = SelectOrZero(covered, All(per_range) * inverse_alpha);
   g.alpha = NegMulAdd(g.error_sum, error, g.alpha);
 
@@ -340,66 +379,78 @@ HWY_INLINE void AddUpstream(const TileGradients<S>& upstream,
                                  LoadPack(&upstream.normal_z[16 * tile])};
 }
 
-/// Gradient of one kept Gaussian, summed over the tile's pixels into its slot.
-/// `weight` = alpha * transmittance, `g_alpha` = alpha * dL/d alpha (zero at the cap).
+/// Gradient of 16 pixels with respect to one Gaussian; zero where it has none.
 template <class S>
-HWY_INLINE void SurfelGradient(const ViewGeometry<S>& view,
-                               const TileRays<S>& rays,
-                               const SurfelRecord<S>& s,
-                               const Pack<S>& kept_range,
-                               const Pack<S>& weight,
-                               const Pack<S>& g_alpha,
-                               const Pack<S>& g_range,
-                               const ImageGradient<S>& g,
-                               S* slot) {
-  const Pack<S> zero = All(S(0));
-  const auto on_surface = kept_range > zero;
-  const Pack<S> t = SelectOrZero(on_surface, kept_range);
-  const Pack<S> u_ray = Dot(Broadcast(s.u), rays.ray);
-  const Pack<S> v_ray = Dot(Broadcast(s.v), rays.ray);
-  Meeting<S> m;
-  m.a = MulAdd(t, u_ray, All(-s.u_c));
-  m.b = MulAdd(t, v_ray, All(-s.v_c));
-  OffsetsTo(s, rays, m);
-  const Pack<S> g_surface = SelectOrZero(on_surface, g_alpha);
-  const Pack<S> g_filter = All(view.lowpass) * (g_surface - g_alpha);  // minus the filter's share
-  const Pack<S> g_a = -(m.a * g_surface);
-  const Pack<S> g_b = -(m.b * g_surface);
-  const Pack<S> g_t = SelectOrZero(on_surface, g_range) + MulAdd(g_a, u_ray, g_b * v_ray);
-  const Pack<S> g_plane = g_t * t * All(S(1) / s.plane);  // t / plane = 1 / <n, r>
-  const Pack<S> at = g_a * t;
-  const Pack<S> bt = g_b * t;
-  const Pack<S> nt = g_plane * t;
-  const Pack<S> terms[16] = {at * rays.ray.x,
-                             at * rays.ray.y,
-                             at * rays.ray.z,
-                             bt * rays.ray.x,
-                             bt * rays.ray.y,
-                             bt * rays.ray.z,
-                             NegMulAdd(nt, rays.ray.x, weight * g.normal.x),
-                             NegMulAdd(nt, rays.ray.y, weight * g.normal.y),
-                             NegMulAdd(nt, rays.ray.z, weight * g.normal.z),
-                             g_plane,
-                             -g_a,
-                             -g_b,
-                             g_alpha,
-                             g_filter * m.dx,
-                             g_filter * m.dy,
-                             Select(on_surface, zero, g_range)};
+struct RayGradient {
+  Pack<S> weight;  ///< alpha * transmittance
+  Pack<S> alpha;   ///< alpha * dL/d alpha
+  Pack<S> range;   ///< dL/d range
+};
+
+/// Sums the gradient of one kept Gaussian over the tile's pixels into its slot. `kept_range`: as
+/// in KeptSurfels.
+template <Pass kPass, class S>
+HWY_INLINE void SumSurfelGradient(const ViewGeometry<S>& view,
+                                  const TileRays<S>& rays,
+                                  const SurfelRecord<S>& s,
+                                  const Pack<S>& kept_range,
+                                  const RayGradient<S>& ray,
+                                  const Pack3<S>& g_normal,
+                                  S* slot) {
+  const auto on_surface = kept_range > All(S(0));
+  // A pass that only learns from surfaces has no other rays with a gradient.
+  const auto of_surface = [&](const Pack<S>& value) {
+    return kPass == Pass::kLearn ? value : SelectOrZero(on_surface, value);
+  };
+  const Pack<S> t = of_surface(kept_range);
+  const Pack<S> t_u_ray = t * Dot(Broadcast(s.u), rays.ray);
+  const Pack<S> t_v_ray = t * Dot(Broadcast(s.v), rays.ray);
+  const Pack<S> a = t_u_ray - All(s.u_c);
+  const Pack<S> b = t_v_ray - All(s.v_c);
+  const Pack<S> g_alpha = of_surface(ray.alpha);
+  const Pack<S> g_a = g_alpha * a;
+  const Pack<S> g_b = g_alpha * b;
+  const Pack<S> travel =
+      NegMulAdd(g_a, t_u_ray, NegMulAdd(g_b, t_v_ray, of_surface(ray.range) * t));
+  const Pack<S> terms[12] = {ray.alpha,
+                             g_a,
+                             g_b,
+                             g_a * a,
+                             g_a * b,
+                             g_b * b,
+                             travel,
+                             travel * a,
+                             travel * b,
+                             ray.weight * g_normal.x,
+                             ray.weight * g_normal.y,
+                             ray.weight * g_normal.z};
   SumEach(terms, slot);
+  const Pack<S> zero = All(S(0));
+  if constexpr (kPass == Pass::kLearn) {
+    StoreZeros<4>(slot + kSlotColumn);
+  } else {
+    const Pack<S> dx = All(LocalColumn(s, rays)) - rays.column;
+    const Pack<S> dy = All(s.row - rays.corner_row) - rays.row;
+    const Pack<S> g_filter = All(-view.lowpass) * Select(on_surface, zero, ray.alpha);
+    const Pack<S> filter_terms[4] = {
+        g_filter * dx, g_filter * dy, Select(on_surface, zero, ray.range), zero};
+    SumEach(filter_terms, slot + kSlotColumn);
+  }
 }
 
 /// Walks the kept Gaussians back to front with one running suffix sum.
-template <class S>
+template <Pass kPass, class S>
 HWY_INLINE void BackTile(const TileJob<S>& job,
                          const TileRays<S>& rays,
+                         const PixelRanges<S>& ranges,
                          const Blend<S>& blend,
                          const ImageGradient<S>& g,
                          const KeptSurfels<S>& kept,
                          std::size_t count) {
   const Pack<S> zero = All(S(0));
   // A loss may leave out what only the screen-space filter shows.
-  const bool through_filter = job.loss == nullptr || job.loss->through_filter;
+  const bool through_filter =
+      kPass != Pass::kLearn && (job.loss == nullptr || job.loss->through_filter);
   Pack<S> transmittance = blend.transmittance;
   Pack<S> suffix = zero;
   for (std::size_t i = count; i-- > 0;) {
@@ -408,39 +459,39 @@ HWY_INLINE void BackTile(const TileJob<S>& job,
     const Pack<S> alpha = LoadPack(&kept.alpha[16 * i]);
     const Pack<S> kept_range = LoadPack(&kept.range[16 * i]);
     if (i >= kPrefetchAhead) {
-      hwy::Prefetch(&job.records[kept.pair[i - kPrefetchAhead].record]);
-      hwy::Prefetch(&job.slots[16 * kept.pair[i - kPrefetchAhead].slot]);
+      hwy::Prefetch(&job.slots[16 * static_cast<std::size_t>(kept.pair[i - kPrefetchAhead].slot)]);
     }
-    const auto seen = alpha > zero;
     const Pack<S> inverse = Reciprocal(All(S(1)) - alpha);
     transmittance = transmittance * inverse;
     const Pack<S> weight = alpha * transmittance;
     const Pack<S> range = Abs(kept_range);
-    const Pack<S> error = range - g.measured;
-    const Pack<S> value =
-        MulAdd(g.error_sum, Min(Abs(error), g.range_cap), MulAdd(g.range_sum, range, g.alpha)) +
-        Dot(g.normal, Broadcast(s.n));
+    const Pack<S> error = range - ranges.measured;
+    const Pack<S> miss = Abs(error);
+    Pack<S> value = MulAdd(g.error_sum, Min(miss, ranges.cap), g.alpha);
+    if constexpr (kPass == Pass::kAll) value = MulAdd(g.range_sum, range, value);
+    value = DotAdd(g.normal, Broadcast(s.n), value);
     const Pack<S> gained = weight * value;
-    auto reached = seen & (range < g.hidden_from);
-    if (!through_filter) reached = reached & (kept_range > zero);
-    const auto below_cap = reached & (alpha < All(job.view->alpha_cap));
-    const Pack<S> g_alpha = SelectOrZero(below_cap, NegMulAdd(suffix * inverse, alpha, gained));
+    const Pack<S> behind = suffix;
     suffix = suffix + gained;
-    const auto is_median = seen & Equal(blend.median_entry, All(static_cast<S>(i)));
-    const Pack<S> g_error =
-        SelectOrZero(Abs(error) < g.range_cap, Select(error > zero, g.error_sum, -g.error_sum));
-    const Pack<S> g_range = SelectOrZero(
-        reached, MulAdd(weight, g.range_sum + g_error, SelectOrZero(is_median, g.median)));
-    SurfelGradient(*job.view,
-                   rays,
-                   s,
-                   kept_range,
-                   SelectOrZero(reached, weight),
-                   g_alpha,
-                   g_range,
-                   g,
-                   job.slots + 16 * static_cast<std::size_t>(pair.slot));
-    job.slot_used[pair.slot] = 1;
+    auto reached = (alpha > zero) & (range < g.hidden_from);
+    if (!through_filter) reached = reached & (kept_range > zero);
+    if (None(reached)) {
+      job.slot_state[pair.slot] = kSeen;
+      continue;
+    }
+    job.slot_state[pair.slot] = kWritten;
+    const auto below_cap = reached & (alpha < All(job.view->alpha_cap));
+    const auto in_cap = reached & (miss < ranges.cap);
+    RayGradient<S> ray;
+    ray.weight = SelectOrZero(reached, weight);
+    ray.alpha = SelectOrZero(below_cap, NegMulAdd(behind * inverse, alpha, gained));
+    ray.range = SelectOrZero(in_cap, weight * CopySign(g.error_sum, error));
+    if constexpr (kPass == Pass::kAll) {
+      const auto is_median = reached & Equal(blend.median_entry, All(static_cast<S>(i)));
+      ray.range = ray.range + MulAdd(ray.weight, g.range_sum, SelectOrZero(is_median, g.median));
+    }
+    S* slot = job.slots + 16 * static_cast<std::size_t>(pair.slot);
+    SumSurfelGradient<kPass>(*job.view, rays, s, kept_range, ray, g.normal, slot);
   }
 }
 
@@ -450,31 +501,46 @@ HWY_INLINE bool AnyTarget(const TileTargets<S>& targets, std::size_t tile) {
 }
 
 template <class S>
+HWY_INLINE PixelRanges<S> RangesOf(const TileJob<S>& job, std::size_t tile) {
+  if (job.targets == nullptr) return {All(S(0)), All(S(0))};
+  return {LoadPack(&job.targets->range_m[16 * tile]), All(static_cast<S>(job.loss->range_cap_m))};
+}
+
+template <class S>
 HWY_INLINE void RenderAll(const TileJob<S>& job, std::size_t begin, std::size_t end) {
   KeptSurfels<S>& kept = Scratch<S>();
+  const PixelRanges<S> no_ranges{All(S(0)), All(S(0))};
   for (std::size_t tile = begin; tile < end; ++tile) {
     Blend<S> blend = EmptyBlend<S>();
-    BlendTile(job, tile, RaysOf(*job.view, tile), blend, kept);
+    BlendTile<Pass::kRender>(job, tile, RaysOf(*job.view, tile), no_ranges, blend, kept);
     StoreTile(blend, tile, *job.images);
   }
 }
 
-template <class S>
+template <Pass kPass, class S>
 HWY_INLINE LossSums StepAll(const TileJob<S>& job, std::size_t begin, std::size_t end) {
   KeptSurfels<S>& kept = Scratch<S>();
   LossSums sums;
   for (std::size_t tile = begin; tile < end; ++tile) {
     if (job.upstream == nullptr && !AnyTarget(*job.targets, tile)) continue;
     const TileRays<S> rays = RaysOf(*job.view, tile);
+    const PixelRanges<S> ranges = RangesOf(job, tile);
     Blend<S> blend = EmptyBlend<S>();
-    const std::size_t count = BlendTile(job, tile, rays, blend, kept);
-    StoreTile(blend, tile, *job.images);
+    const std::size_t count = BlendTile<kPass>(job, tile, rays, ranges, blend, kept);
+    if constexpr (kPass == Pass::kAll) StoreTile(blend, tile, *job.images);
     ImageGradient<S> gradient = NoGradient<S>();
-    if (job.targets != nullptr) sums += PixelLoss(job, tile, blend, kept, count, gradient);
+    if (job.targets != nullptr) sums += PixelLoss(job, tile, ranges, blend, gradient);
     if (job.upstream != nullptr) AddUpstream(*job.upstream, tile, gradient);
-    BackTile(job, rays, blend, gradient, kept, count);
+    BackTile<kPass>(job, rays, ranges, blend, gradient, kept, count);
   }
   return sums;
+}
+
+template <class S>
+HWY_INLINE LossSums Step(const TileJob<S>& job, std::size_t begin, std::size_t end) {
+  const bool learns_from_surfaces = job.upstream == nullptr && !job.loss->through_filter;
+  return learns_from_surfaces ? StepAll<Pass::kLearn>(job, begin, end)
+                              : StepAll<Pass::kAll>(job, begin, end);
 }
 
 void RenderFloat(const TileJob<float>& job, std::size_t begin, std::size_t end) {
@@ -484,10 +550,10 @@ void RenderDouble(const TileJob<double>& job, std::size_t begin, std::size_t end
   RenderAll(job, begin, end);
 }
 LossSums StepFloat(const TileJob<float>& job, std::size_t begin, std::size_t end) {
-  return StepAll(job, begin, end);
+  return Step(job, begin, end);
 }
 LossSums StepDouble(const TileJob<double>& job, std::size_t begin, std::size_t end) {
-  return StepAll(job, begin, end);
+  return Step(job, begin, end);
 }
 
 }  // namespace

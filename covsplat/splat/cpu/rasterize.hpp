@@ -21,7 +21,7 @@ struct TileJob {
   const LossConfig* loss = nullptr;
   const TileGradients<S>* upstream = nullptr;  ///< may be null
   S* slots = nullptr;                          ///< [16 x pairs]
-  std::uint8_t* slot_used = nullptr;           ///< [pairs], set to 1 where a slot was written
+  SlotState* slot_state = nullptr;             ///< [pairs]
 };
 
 /// Renders tiles [begin, end) into `images`.
@@ -29,7 +29,8 @@ template <class S>
 void RenderTiles(const TileJob<S>& job, std::size_t begin, std::size_t end);
 
 /// Renders tiles [begin, end), evaluates the loss of their pixels and leaves its gradient in the
-/// slots. Tiles without any measurement are skipped unless there is an upstream gradient.
+/// slots. Tiles without any measurement are skipped unless there is an upstream gradient. `images`
+/// are only written if there is one, or if the loss learns through the screen-space filter.
 template <class S>
 LossSums StepTiles(const TileJob<S>& job, std::size_t begin, std::size_t end);
 

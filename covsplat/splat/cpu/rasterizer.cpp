@@ -1,5 +1,6 @@
 #include "covsplat/splat/cpu/rasterizer.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "covsplat/core/check.hpp"
@@ -15,7 +16,7 @@ constexpr std::size_t kTilesPerTask = 64;
 
 template <class S>
 Rasterizer<S>::Rasterizer(const SensorModel& sensor, const RasterConfig& config, ThreadPool& pool)
-    : pool_(pool), view_(sensor, config) {
+    : pool_(pool), view_(sensor, config), binner_(pool) {
   images_.Resize(view_.Tiles());
 }
 
@@ -33,13 +34,10 @@ void Rasterizer<S>::LookFrom(const SE3& T_map_sensor,
   for (std::size_t i = 0; i < active_.size(); ++i) active_[i] = static_cast<std::uint32_t>(i);
   Project(gaussians, true);
   binner_.Bin(view_, std::span<const SurfelRecord<S>>(records_), boxes_);
-  const auto is_visible = [&](std::uint32_t block) {
-    const std::vector<std::uint32_t>& begin = binner_.Bins().slot_begin;
-    return begin[kBlockSize * block] < begin[kBlockSize * (block + 1)];
-  };
-  std::erase_if(active_, [&](std::uint32_t block) { return !is_visible(block); });
-  slots_.resize(16 * Pairs());
-  slot_used_.assign(Pairs(), 0);
+  std::erase_if(active_, [&](std::uint32_t block) {
+    const auto boxes = std::span<const TileBox>(boxes_).subspan(kBlockSize * block, kBlockSize);
+    return std::all_of(boxes.begin(), boxes.end(), IsEmpty);
+  });
   bins_are_fresh_ = true;
 }
 
@@ -69,9 +67,16 @@ TileJob<S> Rasterizer<S>::MakeTileJob() {
   job.bins = &binner_.Bins();
   job.drop_unseen = std::exchange(bins_are_fresh_, false);
   job.images = &images_;
-  job.slots = slots_.data();
-  job.slot_used = slot_used_.data();
   return job;
+}
+
+template <class S>
+void Rasterizer<S>::PrepareSlots() {
+  if (!binner_.Bins().slot_begin.empty()) return;
+  binner_.AssignSlots();
+  const std::size_t slots = binner_.Bins().slot_begin.back();
+  slots_.resize(16 * slots);
+  slot_state_.assign(slots, kUnseen);
 }
 
 template <class S>
@@ -83,7 +88,10 @@ void Rasterizer<S>::Render() {
 }
 
 template <class S>
-LossSums Rasterizer<S>::RunStep(const TileJob<S>& job) {
+LossSums Rasterizer<S>::RunStep(TileJob<S> job) {
+  PrepareSlots();
+  job.slots = slots_.data();
+  job.slot_state = slot_state_.data();
   return ParallelSum(
       pool_, view_.Tiles(), kTilesPerTask, LossSums{}, [&](std::size_t begin, std::size_t end) {
         return StepTiles<S>(job, begin, end);
@@ -118,7 +126,7 @@ OptimizeJob<S> Rasterizer<S>::MakeOptimizeJob(GaussianColumns<S>& gaussians) {
   job.records = records_.data();
   job.bins = &binner_.Bins();
   job.slots = slots_.data();
-  job.slot_used = slot_used_.data();
+  job.slot_state = slot_state_.data();
   return job;
 }
 

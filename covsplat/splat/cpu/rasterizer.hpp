@@ -52,7 +52,9 @@ class Rasterizer {
  private:
   void Project(const GaussianColumns<S>& gaussians, bool with_boxes);
   TileJob<S> MakeTileJob();
-  LossSums RunStep(const TileJob<S>& job);
+  /// Gives the pairs their slots where they have none.
+  void PrepareSlots();
+  LossSums RunStep(TileJob<S> job);
   OptimizeJob<S> MakeOptimizeJob(GaussianColumns<S>& gaussians);
 
   ThreadPool& pool_;
@@ -65,8 +67,8 @@ class Rasterizer {
   std::vector<TileBox> boxes_;
   TileBinner binner_;
   TileImages<S> images_;
-  std::vector<S> slots_;
-  std::vector<std::uint8_t> slot_used_;
+  AlignedVector<S> slots_;
+  std::vector<SlotState> slot_state_;
   bool bins_are_fresh_ = false;  ///< no pass has dropped what is not seen yet
 };
 

@@ -95,6 +95,20 @@ struct LossWeights {
   bool through_filter;
 };
 
+/// What the 16 sums in a gradient slot are; all are linear in the ray, so that pixels just add up.
+enum GradientSum : int {
+  kSumU = 0,        ///< 3: with respect to u
+  kSumV = 3,        ///< 3: with respect to v
+  kSumNormal = 6,   ///< 3: with respect to n
+  kSumPlane = 9,    ///< <n, c>
+  kSumUC = 10,      ///< <u, c>
+  kSumVC = 11,      ///< <v, c>
+  kSumAlpha = 12,   ///< alpha * d/d alpha
+  kSumColumn = 13,  ///< of the centre
+  kSumRow = 14,     ///< of the centre
+  kSumRange = 15    ///< of the centre
+};
+
 enum LossTerm : int { kLossRange, kLossOpacity, kLossNormal, kLossTermCount };
 
 struct StepJob {
