@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "apps/keyframe_log.hpp"
 #include "apps/run_pictures.hpp"
 #include "apps/run_report.hpp"
 #include <fmt/format.h>
@@ -71,6 +72,8 @@ Result<void> ConcludeRun(SlamSystem& system,
   results.keyframes = static_cast<std::size_t>(map.Keyframes());
   results.mapper_steps = system.GetMapper().Steps();
   results.mapper_times = system.MapperTimes();
+  results.training = system.GetMapper().Views().Training();
+  results.map_memory = system.MemoryOfMap();
   const SavedMap saved = FlattenMap(map);
   Result<void> written = WriteMapPly(folder / "map.ply", saved);
   std::error_code ignored;
@@ -81,6 +84,8 @@ Result<void> ConcludeRun(SlamSystem& system,
   const auto keyframes =
       WriteTum(folder / "keyframes_tum.txt", KeyframesOf(std::as_const(system), results));
   if (written) written = keyframes;
+  const auto training = WriteKeyframes(folder, results.training, system.KeyframeScans());
+  if (written) written = training;
   Evaluate(results);
   const Result<void> measured = MeasureMap(system, config.slam, results);
   if (written) written = measured;

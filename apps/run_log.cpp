@@ -27,12 +27,12 @@ std::string Header() {
       "scan,stamp_s,state,keyframe,points,not_finite,out_of_range,has_time,source_points,"
       "correspondences,inlier_ratio,overlap,support,rms_residual_m,iterations,degenerate_"
       "directions,"
-      "gaussians,target_surfels,mapper_steps,rss_bytes,track_ms";
+      "gaussians,target_surfels,mapper_steps,rss_bytes,latency_ms,track_ms";
   for (const char* stage : kStages) line += fmt::format(",{}_ms", stage);
   return line + "\n";
 }
 
-std::string Row(const ScanRecord& r, std::int64_t rss_bytes) {
+std::string Row(const ScanRecord& r, const ScanCost& cost) {
   std::string line = fmt::format("{},{:.9f},{},{:d},{},{},{},{:d},",
                                  r.scan,
                                  r.stamp_s,
@@ -42,7 +42,7 @@ std::string Row(const ScanRecord& r, std::int64_t rss_bytes) {
                                  r.not_finite,
                                  r.out_of_range,
                                  r.has_time);
-  line += fmt::format("{},{},{:.4f},{:.4f},{:.4f},{:.5f},{},{},{},{},{},{},{:.3f}",
+  line += fmt::format("{},{},{:.4f},{:.4f},{:.4f},{:.5f},{},{},{},{},{},{},{:.3f},{:.3f}",
                       r.source_points,
                       r.correspondences,
                       r.inlier_ratio,
@@ -54,7 +54,8 @@ std::string Row(const ScanRecord& r, std::int64_t rss_bytes) {
                       r.gaussians,
                       r.target_surfels,
                       r.mapper_steps,
-                      rss_bytes,
+                      cost.rss_bytes,
+                      cost.latency_ms,
                       r.track_ms);
   for (const char* stage : kStages) line += fmt::format(",{:.3f}", r.times.Of(stage));
   return line + "\n";
@@ -114,9 +115,9 @@ PoseRows::Text PoseRows::FillTo(std::int64_t count) {
   return text;
 }
 
-Result<void> RunLog::Append(const ScanRecord& record, std::int64_t rss_bytes) {
+Result<void> RunLog::Append(const ScanRecord& record, const ScanCost& cost) {
   return AppendPoses(rows_.Next(record)).and_then([&] {
-    return frames_.Append(Row(record, rss_bytes));
+    return frames_.Append(Row(record, cost));
   });
 }
 

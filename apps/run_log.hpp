@@ -17,6 +17,12 @@ struct ScanSelection {
   std::int64_t jump = 1;
 };
 
+/// What a scan took beside what its record tells.
+struct ScanCost {
+  double latency_ms = 0.0;     ///< scan in to pose out: from its arrival, so with what it waited
+  std::int64_t rss_bytes = 0;  ///< the process's, when the scan was done
+};
+
 /// The rows of both trajectory files. Scans that were left out (damaged, out of order, dropped) get
 /// poses too, or the rows of KITTI, which have no times, would not tell which scan they are of:
 /// between their neighbours they are interpolated; before the first and after the last tracked
@@ -47,7 +53,7 @@ class RunLog {
  public:
   static Result<RunLog> Open(const std::filesystem::path& folder, const ScanSelection& scans);
 
-  Result<void> Append(const ScanRecord& record, std::int64_t rss_bytes);
+  Result<void> Append(const ScanRecord& record, const ScanCost& cost);
   /// After the last scan; `count` scans were selected in all.
   Result<void> FillTo(std::int64_t count);
   Result<void> Close();

@@ -23,6 +23,7 @@ ReportSummary SummaryOf(const RunResults& results) {
   ReportSummary summary;
   summary.scans = static_cast<std::int64_t>(results.records.size());
   summary.lost_scans = LostScans(results);
+  summary.late_scans = results.feed.late;
   summary.dropped_scans = results.feed.dropped;
   summary.keyframes = static_cast<std::int64_t>(results.keyframes);
   summary.path_length_m = PathLengthOf(results);
@@ -114,7 +115,13 @@ void AddCurves(const RunResults& results, ReportData& data) {
     for (const ScanRecord& record : results.records) layer.values.push_back(record.times.Of(stage));
     data.stage_ms.push_back(std::move(layer));
   }
-  data.rss_bytes = results.rss_bytes;
+  for (const ScanCost& cost : results.costs) {
+    data.rss_bytes.push_back(static_cast<double>(cost.rss_bytes));
+    data.latency_ms.push_back(cost.latency_ms);
+  }
+  for (const KeyframeTraining& keyframe : results.training) {
+    data.keyframe_steps.push_back(static_cast<double>(keyframe.steps));
+  }
 }
 
 /// Runs of lost scans, degenerate ones, and what the recording did wrong, in order.
@@ -176,7 +183,13 @@ void AddDetails(const SlamSystem& system, const RunResults& results, ReportData&
                   {"optimiser steps",
                    fmt::format("{} ({:.0f} per keyframe)",
                                FormatCount(static_cast<double>(results.mapper_steps)),
-                               static_cast<double>(results.mapper_steps) / keyframes)}};
+                               static_cast<double>(results.mapper_steps) / keyframes)},
+                  {"latency", LatencyText(results)},
+                  {"memory of the map",
+                   fmt::format("Gaussians {}, training views {}, places {}",
+                               FormatBytes(static_cast<double>(results.map_memory.gaussians_bytes)),
+                               FormatBytes(static_cast<double>(results.map_memory.views_bytes)),
+                               FormatBytes(static_cast<double>(results.map_memory.places_bytes)))}};
   std::string mapper;
   for (const auto& [stage, ms] : results.mapper_times.Stages()) {
     mapper += fmt::format("{}{} {}", mapper.empty() ? "" : ", ", stage, FormatSeconds(ms * 1e-3));

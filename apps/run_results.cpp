@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "covsplat/core/percentile.hpp"
 #include "covsplat/report/format.hpp"
 
 namespace covsplat {
@@ -49,10 +50,38 @@ Json HeldOutJson(const RunResults& results) {
 Json ScansJson(const RunResults& results) {
   return {{"tracked", results.records.size()},
           {"lost", LostScans(results)},
+          {"late", results.feed.late},
           {"dropped", results.feed.dropped},
           {"damaged", results.feed.damaged},
           {"backwards", results.feed.backwards},
           {"without_pose", results.without_pose}};
+}
+
+Json LatencyJson(const RunResults& results) {
+  const Spread latency_ms = LatencyOf(results);
+  return {{"p50", latency_ms.p50},
+          {"p95", latency_ms.p95},
+          {"p99", latency_ms.p99},
+          {"max", latency_ms.max}};
+}
+
+/// Optimiser steps on the views of single keyframes.
+Json TrainingJson(const RunResults& results) {
+  std::vector<std::int64_t> steps;
+  for (const KeyframeTraining& keyframe : results.training) steps.push_back(keyframe.steps);
+  if (steps.empty()) return nullptr;
+  return {{"min", Percentile(steps, 0.0)},
+          {"median", Percentile(steps, 0.5)},
+          {"max", Percentile(steps, 1.0)}};
+}
+
+Json MemoryJson(const RunResults& results) {
+  const MemoryUse memory = ReadMemoryUse();
+  return {{"rss_bytes", memory.rss_bytes},
+          {"peak_rss_bytes", memory.peak_rss_bytes},
+          {"gaussians_bytes", results.map_memory.gaussians_bytes},
+          {"views_bytes", results.map_memory.views_bytes},
+          {"places_bytes", results.map_memory.places_bytes}};
 }
 
 /// Mean over all scans of what the stages took, and the mapper's total.
@@ -67,6 +96,7 @@ Json TimesJson(const RunResults& results) {
   Json json = {{"feed_s", results.feed_s},
                {"finish_s", results.finish_s},
                {"scans_per_s", ScansPerSecond(results)},
+               {"latency_ms", LatencyJson(results)},
                {"track_ms_per_scan", track_ms / scans}};
   for (const auto& [stage, ms] : sum.Stages()) {
     json["stage_ms_per_scan"][std::string(stage)] = ms / scans;
@@ -106,6 +136,13 @@ std::int64_t LostScans(const RunResults& results) {
   });
 }
 
+Spread LatencyOf(const RunResults& results) {
+  std::vector<double> ms;
+  for (const ScanCost& cost : results.costs) ms.push_back(cost.latency_ms);
+  if (ms.empty()) return {};
+  return {Percentile(ms, 0.5), Percentile(ms, 0.95), Percentile(ms, 0.99), Percentile(ms, 1.0)};
+}
+
 double ScansPerSecond(const RunResults& results) {
   if (results.feed_s <= 0.0) return 0.0;
   return static_cast<double>(results.records.size()) / results.feed_s;
@@ -123,26 +160,25 @@ std::optional<HeldOutMeans> MeansOf(const std::vector<HeldOutResult>& held_out) 
 }
 
 std::string MetricsJson(const RunResults& results) {
-  const MemoryUse memory = ReadMemoryUse();
-  Json json = {
-      {"version", COVSPLAT_VERSION},
-      {"recording", results.recording.string()},
-      {"interrupted", results.interrupted},
-      {"sensor", results.sensor_verdict},
-      {"schedule", results.schedule},
-      {"backend", results.backend},
-      {"threads", results.threads},
-      {"machine", MachineName()},
-      {"scans", ScansJson(results)},
-      {"path_length_m", PathLengthOf(results)},
-      {"time", TimesJson(results)},
-      {"memory", {{"rss_bytes", memory.rss_bytes}, {"peak_rss_bytes", memory.peak_rss_bytes}}},
-      {"map",
-       {{"gaussians", results.gaussians},
-        {"keyframes", results.keyframes},
-        {"optimizer_steps", results.mapper_steps},
-        {"file_bytes", results.map_bytes}}},
-      {"held_out", HeldOutJson(results)}};
+  Json json = {{"version", COVSPLAT_VERSION},
+               {"recording", results.recording.string()},
+               {"interrupted", results.interrupted},
+               {"sensor", results.sensor_verdict},
+               {"schedule", results.schedule},
+               {"backend", results.backend},
+               {"threads", results.threads},
+               {"machine", MachineName()},
+               {"scans", ScansJson(results)},
+               {"path_length_m", PathLengthOf(results)},
+               {"time", TimesJson(results)},
+               {"memory", MemoryJson(results)},
+               {"map",
+                {{"gaussians", results.gaussians},
+                 {"keyframes", results.keyframes},
+                 {"optimizer_steps", results.mapper_steps},
+                 {"steps_per_keyframe", TrainingJson(results)},
+                 {"file_bytes", results.map_bytes}}},
+               {"held_out", HeldOutJson(results)}};
   if (results.loops) {
     json["loops"] = {{"accepted", results.loops->accepted},
                      {"candidates", results.loops->candidates}};
@@ -152,6 +188,12 @@ std::string MetricsJson(const RunResults& results) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
+std::string LatencyText(const RunResults& results) {
+  const Spread ms = LatencyOf(results);
+  return fmt::format(
+      "median {:.0f} ms, 95 % {:.0f}, 99 % {:.0f}, at most {:.0f}", ms.p50, ms.p95, ms.p99, ms.max);
+}
+
 std::string SummaryText(const RunResults& results) {
   const auto count = [](auto n) { return FormatCount(static_cast<double>(n)); };
   std::string scans = count(results.records.size());
@@ -159,21 +201,25 @@ std::string SummaryText(const RunResults& results) {
     if (n > 0) scans += fmt::format(", {} {}", n, what);
   };
   add(LostScans(results), "lost");
+  add(results.feed.late, "late");
   add(results.feed.dropped, "dropped");
   add(results.feed.damaged, "damaged");
   add(results.feed.backwards, "out of order");
   add(results.without_pose, "without a given pose");
   std::string text = fmt::format(
       "scans       {}\nspeed       {:.1f} scan/s ({} and {} to finish)\n"
-      "path        {}\nmap         {} Gaussians, {}, {} keyframes\n",
+      "latency     {} to the pose\n"
+      "path        {}\nmap         {} Gaussians, {}, {} keyframes\nmemory      {} at most\n",
       scans,
       ScansPerSecond(results),
       FormatSeconds(results.feed_s),
       FormatSeconds(results.finish_s),
+      LatencyText(results),
       FormatMetres(PathLengthOf(results)),
       count(results.gaussians),
       FormatBytes(results.map_bytes),
-      count(results.keyframes));
+      count(results.keyframes),
+      FormatBytes(static_cast<double>(ReadMemoryUse().peak_rss_bytes)));
   if (results.loops) {
     text += fmt::format("loops       {} of {} places that looked alike\n",
                         results.loops->accepted,

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/run_log.hpp"
 #include "apps/scan_feed.hpp"
 
 #include "covsplat/eval/trajectory_error.hpp"
@@ -48,7 +49,7 @@ struct RunResults {
   bool interrupted = false;
 
   std::vector<ScanRecord> records;  ///< one per tracked scan
-  std::vector<double> rss_bytes;    ///< as many
+  std::vector<ScanCost> costs;      ///< as many
   FeedCounts feed;
   std::int64_t without_pose = 0;  ///< scans that the given poses do not cover
   std::vector<FeedProblem> problems;
@@ -60,6 +61,8 @@ struct RunResults {
   std::size_t gaussians = 0;
   std::size_t keyframes = 0;
   std::int64_t mapper_steps = 0;
+  std::vector<KeyframeTraining> training;  ///< [keyframes]
+  MapMemory map_memory;
   StageTimes mapper_times;
   double map_bytes = 0.0;
   std::vector<MapPicture> pictures;
@@ -76,6 +79,18 @@ std::size_t RecordOf(const RunResults& results, std::int64_t scan);
 double PathLengthOf(const RunResults& results);
 std::int64_t LostScans(const RunResults& results);
 double ScansPerSecond(const RunResults& results);
+
+/// The value that a share of all does not exceed, and the largest.
+struct Spread {
+  double p50 = 0.0;
+  double p95 = 0.0;
+  double p99 = 0.0;
+  double max = 0.0;
+};
+/// From each scan's arrival to its pose, in ms; zeros without any scan.
+Spread LatencyOf(const RunResults& results);
+/// The same for people.
+std::string LatencyText(const RunResults& results);
 
 /// Mean over the held-out scans; nothing without any.
 struct HeldOutMeans {

@@ -11,12 +11,14 @@
 namespace covsplat {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 class FileFeed : public ScanFeed {
  public:
   FileFeed(std::unique_ptr<ScanSource> source, std::int64_t jump, std::function<bool()> stop)
       : source_(std::move(source)), jump_(jump), stop_(std::move(stop)) {}
 
-  std::optional<Scan> Next() override {
+  std::optional<FedScan> Next() override {
     while (!stop_()) {
       Result<std::optional<Scan>> read = source_->Next();
       const bool wanted = taken_++ % jump_ == 0;
@@ -30,7 +32,7 @@ class FileFeed : public ScanFeed {
         problems_.push_back({(*read)->index, Backwards(**read)});
       } else {
         last_stamp_s_ = (*read)->stamp_s;
-        return std::move(*read);
+        return FedScan{std::move(**read), Clock::now()};
       }
     }
     return std::nullopt;
@@ -64,18 +66,22 @@ class RealtimeFeed : public ScanFeed {
       : feed_(std::move(feed)), stop_(std::move(stop)) {}
   ~RealtimeFeed() override { thread_ = {}; }  // asks it to stop and joins
 
-  std::optional<Scan> Next() override {
+  std::optional<FedScan> Next() override {
     if (!thread_.joinable()) {
       thread_ = std::jthread([this](const std::stop_token& token) { Deliver(token); });
     }
     std::unique_lock lock(mutex_);
+    if (waiting_) ++late_;
     while (!waiting_ && !ended_ && !stop_()) news_.wait_for(lock, kPatience);
     return std::exchange(waiting_, std::nullopt);
   }
 
   FeedCounts Counts() override {
     const std::scoped_lock lock(mutex_);
-    return counts_;
+    FeedCounts counts = counts_;
+    counts.late = late_;
+    counts.dropped = dropped_;
+    return counts;
   }
   std::vector<FeedProblem> TakeProblems() override {
     const std::scoped_lock lock(mutex_);
@@ -83,22 +89,24 @@ class RealtimeFeed : public ScanFeed {
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds kPatience{50};
 
   void Deliver(const std::stop_token& token) {
-    const Clock::time_point start = Clock::now();
+    Clock::time_point start;
     std::optional<double> first_stamp_s;
     while (!token.stop_requested()) {
-      std::optional<Scan> scan = feed_->Next();
-      if (!scan) break;
-      if (!first_stamp_s) first_stamp_s = scan->stamp_s;
-      const std::chrono::duration<double> after(scan->stamp_s - *first_stamp_s);
+      std::optional<FedScan> fed = feed_->Next();
+      if (!fed) break;
+      if (!first_stamp_s) {
+        first_stamp_s = fed->scan.stamp_s;
+        start = fed->arrival;
+      }
+      const std::chrono::duration<double> after(fed->scan.stamp_s - *first_stamp_s);
       const auto due = start + std::chrono::duration_cast<Clock::duration>(after);
       while (Clock::now() < due && !token.stop_requested()) {
         std::this_thread::sleep_until(std::min(due, Clock::now() + kPatience));
       }
-      Put(std::move(*scan));
+      Put({std::move(fed->scan), due});
     }
     const std::scoped_lock lock(mutex_);
     ended_ = true;
@@ -106,18 +114,16 @@ class RealtimeFeed : public ScanFeed {
     news_.notify_one();
   }
 
-  void Put(Scan scan) {
+  void Put(FedScan scan) {
     const std::scoped_lock lock(mutex_);
     TakeOver();
     if (waiting_) ++dropped_;
-    counts_.dropped = dropped_;
     waiting_ = std::move(scan);
     news_.notify_one();
   }
 
   void TakeOver() {
     counts_ = feed_->Counts();
-    counts_.dropped = dropped_;
     for (FeedProblem& problem : feed_->TakeProblems()) problems_.push_back(std::move(problem));
   }
 
@@ -126,10 +132,11 @@ class RealtimeFeed : public ScanFeed {
   std::mutex mutex_;
   std::condition_variable news_;
   // All guarded by mutex_.
-  std::optional<Scan> waiting_;
+  std::optional<FedScan> waiting_;
   bool ended_ = false;
+  std::int64_t late_ = 0;
   std::int64_t dropped_ = 0;
-  FeedCounts counts_;
+  FeedCounts counts_;  ///< of what could not be fed
   std::vector<FeedProblem> problems_;
 
   std::jthread thread_;  // last: joins before the rest goes

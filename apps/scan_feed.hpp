@@ -1,6 +1,7 @@
 // ScanFeed: the scans of a recording as a run takes them, with what went wrong on the way.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -15,7 +16,8 @@ namespace covsplat {
 struct FeedCounts {
   std::int64_t damaged = 0;    ///< could not be read
   std::int64_t backwards = 0;  ///< not later than the scan before
-  std::int64_t dropped = 0;    ///< came while the tracker was busy and were overtaken
+  std::int64_t late = 0;       ///< came while the tracker was busy, and waited for it
+  std::int64_t dropped = 0;    ///< waited and were overtaken by the next
 };
 
 struct FeedProblem {
@@ -23,12 +25,19 @@ struct FeedProblem {
   std::string text;
 };
 
+struct FedScan {
+  Scan scan;
+  /// When the recording had it: in real time the moment that its stamp stands for, however late it
+  /// is taken; else the moment in which it is handed out.
+  std::chrono::steady_clock::time_point arrival;
+};
+
 /// One caller's thread.
 class ScanFeed {
  public:
   virtual ~ScanFeed() = default;
   /// The next usable scan; nothing at the end or when `stop` says so.
-  virtual std::optional<Scan> Next() = 0;
+  virtual std::optional<FedScan> Next() = 0;
   virtual FeedCounts Counts() = 0;
   /// What went wrong since the last call.
   virtual std::vector<FeedProblem> TakeProblems() = 0;

@@ -107,9 +107,13 @@ ProgressStatus StatusOf(const Prepared& run, std::int64_t fed, std::int64_t lost
   status.total = run.scans;
   status.ms_per_scan = record.track_ms;
   status.gaussians = static_cast<std::int64_t>(record.gaussians);
-  status.rss_bytes = static_cast<std::int64_t>(run.results.rss_bytes.back());
+  status.rss_bytes = run.results.costs.back().rss_bytes;
   status.lost = lost;
   return status;
+}
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 bool IsComplete(const Prepared& run) {
@@ -121,30 +125,28 @@ Result<void> FeedScans(Prepared& run, RunLog& log, Progress& progress) {
   std::int64_t fed = 0;
   std::int64_t lost = 0;
   while (!Interrupted()) {
-    std::optional<Scan> scan = run.feed->Next();
+    const std::optional<FedScan> scan = run.feed->Next();
     NoteProblems(*run.feed, progress, run.results);
     if (!scan) break;
     ++fed;
-    const std::optional<ScanRecord> record = run.system->Process(*scan);
+    const double waited_ms = 1e3 * SecondsSince(scan->arrival);
+    const std::optional<ScanRecord> record = run.system->Process(scan->scan);
     if (!record) {
       ++run.results.without_pose;
       continue;
     }
     lost += record->state == TrackState::kLost;
     const std::int64_t rss_bytes = ReadMemoryUse().rss_bytes;
-    if (const Result<void> written = log.Append(*record, rss_bytes); !written) return written;
+    const ScanCost cost = {waited_ms + record->track_ms, rss_bytes};
+    if (const Result<void> written = log.Append(*record, cost); !written) return written;
     run.results.records.push_back(*record);
-    run.results.rss_bytes.push_back(static_cast<double>(rss_bytes));
+    run.results.costs.push_back(cost);
     progress.Update(StatusOf(run, fed, lost));
   }
   run.results.feed = run.feed->Counts();
   run.results.interrupted = Interrupted();
   const Result<void> filled = IsComplete(run) ? log.FillTo(run.scans) : Result<void>();
   return filled.and_then([&] { return log.Close(); });
-}
-
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 /// What loops made of the scans' poses, and how they came about.

@@ -35,6 +35,9 @@ struct Place {
   int keyframe = 0;
   std::vector<PlacePoint> points;
   Sight sight;
+
+  bool IsEmpty() const { return points.empty() && sight.Bytes() == 0; }
+  std::size_t Bytes() const { return points.capacity() * sizeof(PlacePoint) + sight.Bytes(); }
 };
 
 /// Keeps the first surface point of each cube of `voxel_m`. `points`: the whole scan.

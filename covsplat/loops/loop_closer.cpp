@@ -10,6 +10,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "covsplat/core/way_spread.hpp"
 #include "covsplat/loops/ground.hpp"
 
 namespace covsplat {
@@ -30,12 +31,7 @@ double AngleOf(const SE3& pose) { return pose.Log().head<3>().norm(); }
 bool LoopCloser::Add(LoopKeyframe keyframe) {
   AddNode(keyframe);
   if (!IsPlace(Poses().back())) return false;
-  if (!places_.empty()) {
-    const Eigen::Vector3d step =
-        Poses().back().Translation() - PoseOf(places_.back()).Translation();
-    way_since_section_m_ += step.norm();
-  }
-  places_.push_back(std::move(keyframe.place));
+  AddPlace(std::move(keyframe.place));
   const Ways ways = WaysFrom(places_.back().keyframe);
   bool found = Look(NearestPlace(ways), ways);
   if (config_.looks.enabled && way_since_section_m_ >= config_.looks.spacing_m) {
@@ -77,6 +73,39 @@ bool LoopCloser::IsPlace(const SE3& T_map_keyframe) const {
   const SE3 moved = PoseOf(places_.back()).Inverse() * T_map_keyframe;
   return moved.Translation().norm() >= config_.search.place_spacing_m ||
          AngleOf(moved) >= config_.search.place_turn_deg * kDegree;
+}
+
+void LoopCloser::AddPlace(Place place) {
+  double step_m = 0.0;
+  if (!places_.empty()) {
+    step_m = (PoseOf(place).Translation() - PoseOf(places_.back()).Translation()).norm();
+  }
+  way_since_section_m_ += step_m;
+  way_to_place_m_.push_back((places_.empty() ? 0.0 : way_to_place_m_.back()) + step_m);
+  places_bytes_ += place.Bytes();
+  places_.push_back(std::move(place));
+  if (static_cast<double>(places_bytes_) > 1e6 * config_.max_places_mb) EmptyLeastMissed();
+}
+
+/// A place without what was seen there adds nothing to local maps. The newest stay: density images
+/// are made of them.
+void LoopCloser::EmptyLeastMissed() {
+  const double newest_m = std::max(config_.looks.way_m, config_.search.new_way_m);
+  std::vector<std::size_t> full;
+  std::vector<double> way_m;
+  std::size_t newest = 0;
+  for (std::size_t p = 0; p < places_.size(); ++p) {
+    if (places_[p].IsEmpty()) continue;
+    full.push_back(p);
+    way_m.push_back(way_to_place_m_[p]);
+    newest += way_to_place_m_.back() - way_m.back() <= newest_m ? 1 : 0;
+  }
+  const std::optional<std::size_t> least = LeastMissed(way_m, newest);
+  if (!least) return;
+  Place& place = places_[full[*least]];
+  places_bytes_ -= place.Bytes();
+  place = {place.keyframe, {}, {}};
+  places_bytes_ += place.Bytes();
 }
 
 /// Dijkstra's shortest paths.

@@ -116,9 +116,15 @@ struct LoopConfig {
   LoopCheckConfig check;
   OdometryNoiseConfig odometry;
   PoseGraphConfig graph;
+  double max_places_mb = 200.0;
 
   template <class Self, class V>
   static void Visit(Self& c, V&& v) {
+    v.Field("max_places_mb",
+            c.max_places_mb,
+            Range{1.0, 1e6},
+            "memory of what was seen at all places; beyond it that of one is given up for each new "
+            "one, so that the way stays covered, but more sparsely");
     v.Section("search", c.search, "where loops are looked for");
     v.Section("looks", c.looks, "what places look like from above");
     v.Section("check", c.check, "which pairs of places are loops");
@@ -171,6 +177,8 @@ class LoopCloser {
   const std::vector<LoopRecord>& Loops() const { return loops_; }
   /// How many of them have this fate.
   std::int64_t Count(LoopFate fate) const;
+  /// Memory of the places.
+  std::size_t PlacesBytes() const { return places_bytes_; }
   /// Whether any was accepted.
   bool HasLoops() const {
     return graph_.edges.size() >= graph_.T_map_node.size() && !Poses().empty();
@@ -204,6 +212,8 @@ class LoopCloser {
 
   void AddNode(const LoopKeyframe& keyframe);
   bool IsPlace(const SE3& T_map_keyframe) const;
+  void AddPlace(Place place);
+  void EmptyLeastMissed();
   Ways WaysFrom(int keyframe) const;
   bool Look(const std::optional<Candidate>& candidate, const Ways& ways);
   std::optional<Candidate> NearestPlace(const Ways& ways) const;
@@ -229,6 +239,8 @@ class LoopCloser {
   std::vector<Link> links_;  ///< [edges]
   OdometryChain odometry_;
   std::deque<Place> places_;  ///< oldest first; places stay where they are in memory
+  std::vector<double> way_to_place_m_;
+  std::size_t places_bytes_ = 0;
   std::vector<Section> sections_;
   double way_since_section_m_ = 0.0;
   std::vector<LoopRecord> loops_;

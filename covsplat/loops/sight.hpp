@@ -28,6 +28,8 @@ class Sight {
   /// Of a point in the same frame.
   Seen See(const Eigen::Vector3f& point) const;
 
+  std::size_t Bytes() const { return nearest_cm_.size() * sizeof(std::uint16_t); }
+
  private:
   std::vector<std::uint16_t> nearest_cm_;  ///< by direction; 0: nothing returned
 };

@@ -20,7 +20,7 @@ void GaussianMap::Append(int keyframe, const SpawnedGaussians& fresh) {
   const std::size_t size = fresh.gaussians.Size();
   if (size == 0) return;
   const std::size_t begin = engine_->Append(keyframe, fresh.gaussians).begin;
-  signals_.resize(engine_->Gaussians().Size());
+  ResizeTightly(signals_, engine_->Gaussians().Size());
   as_spawned_.Resize(engine_->Gaussians().Size());
   for (int p = 0; p < kParameterCount; ++p) {
     std::copy_n(fresh.gaussians.Column(p), size, as_spawned_.Column(p) + begin);
@@ -86,10 +86,7 @@ std::size_t GaussianMap::RemoveIf(F&& f) {
   }
   if (removed == 0) return 0;
   const std::vector<std::size_t> old_row = engine_->Keep(keep);
-  std::vector<GaussianSignals> signals;
-  signals.reserve(old_row.size());
-  for (const std::size_t i : old_row) signals.push_back(signals_[i]);
-  signals_ = std::move(signals);
+  GatherRows(old_row, signals_);
   as_spawned_.Gather(old_row);
   return removed;
 }
@@ -138,6 +135,11 @@ std::size_t GaussianMap::Remove(std::span<const std::size_t> rows) {
   std::vector<std::uint8_t> goes(engine_->Gaussians().Size(), 0);
   for (const std::size_t i : rows) goes[i] = 1;
   return RemoveIf([&](std::size_t i) { return goes[i] != 0; });
+}
+
+std::size_t GaussianMap::Bytes() const {
+  constexpr std::size_t kColumns = 2 * kParameterCount + kMomentCount;
+  return signals_.size() * (kColumns * sizeof(float) + sizeof(GaussianSignals));
 }
 
 std::size_t GaussianMap::Size() const {

@@ -49,6 +49,8 @@ class GaussianMap {
 
   /// Gaussians in the map, padding not counted.
   std::size_t Size() const;
+  /// Memory of all Gaussians: twice their parameters, Adam's memory and the signals.
+  std::size_t Bytes() const;
   int Keyframes() const { return static_cast<int>(engine_->AnchorPoses().size()); }
   const SE3& KeyframePose(int keyframe) const {
     return engine_->AnchorPoses()[static_cast<std::size_t>(keyframe)];

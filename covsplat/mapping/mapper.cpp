@@ -8,8 +8,6 @@
 namespace covsplat {
 namespace {
 
-constexpr std::size_t kNearViews = 8;
-
 /// `gone`: ascending indices.
 std::vector<Disc> Without(std::span<const std::size_t> gone, std::span<const Disc> discs) {
   std::vector<Disc> left;
@@ -35,7 +33,8 @@ Mapper::Mapper(std::unique_ptr<SplatEngine> engine,
       config_(config),
       pool_(pool),
       map_(std::move(engine)),
-      free_space_(sensor, config.reliability) {}
+      free_space_(sensor, config.reliability),
+      views_(map_, static_cast<std::size_t>(sensor.Rows() * sensor.Columns()), config.schedule) {}
 
 void Mapper::Insert(Keyframe keyframe) {
   keyframe.T_map_odom = T_map_odom_;
@@ -91,52 +90,9 @@ void Mapper::Spawn(const Keyframe& keyframe) {
   const SpawnedGaussians spawned =
       SpawnGaussians(keyframe, fit, render ? &*render : nullptr, staying, sensor_, config_.spawn);
   const int number = map_.AddKeyframe(keyframe, spawned);
-  AddView(number);
+  views_.Add(number);
   map_.MarkSeen(number, keyframe, sensor_, config_.feedback.max_keyframe_age);
   map_.PruneSeenThrough(config_.manage.prune_seen_through);
-}
-
-std::vector<int> Mapper::Views() const {
-  std::vector<int> keyframes;
-  for (const View& view : views_) keyframes.push_back(view.keyframe);
-  return keyframes;
-}
-
-double Mapper::Distance(const View& a, const View& b) const {
-  return (map_.KeyframePose(a.keyframe).Translation() - map_.KeyframePose(b.keyframe).Translation())
-      .norm();
-}
-
-void Mapper::AddView(int keyframe) {
-  View view{keyframe, 0.0};
-  if (!views_.empty()) {
-    view.travelled_m = views_.back().travelled_m + Distance(views_.back(), view);
-    ThinViews();
-  }
-  views_.push_back(view);
-}
-
-/// The newest view is to become an older one. Of those from about the same place the first of a
-/// pass stays, and of several passes the last.
-void Mapper::ThinViews() {
-  constexpr double kSamePass = 3.0;  // in spacings of the way
-  const double spacing_m = config_.schedule.view_spacing_m;
-  const View newest = views_.back();
-  views_.pop_back();
-  const auto is_near = [&](const View& view) { return Distance(view, newest) < spacing_m; };
-  const bool is_known = std::ranges::any_of(views_, [&](const View& view) {
-    return is_near(view) && newest.travelled_m - view.travelled_m < kSamePass * spacing_m;
-  });
-  if (is_known) {
-    map_.Engine().DropView(newest.keyframe);
-    return;
-  }
-  std::erase_if(views_, [&](const View& view) {
-    if (!is_near(view)) return false;
-    map_.Engine().DropView(view.keyframe);
-    return true;
-  });
-  views_.push_back(newest);
 }
 
 void Mapper::Manage() {
@@ -154,8 +110,8 @@ void Mapper::JoinPasses() {
   const ScopedTimer timer(times_, "manage");
   const double reach_m = sensor_.MaxRange();
   std::vector<Eigen::Vector3d> done;
-  for (const View& view : views_) {
-    const SE3& pose = map_.KeyframePose(view.keyframe);
+  for (const int keyframe : views_.Keyframes()) {
+    const SE3& pose = map_.KeyframePose(keyframe);
     const bool is_done = std::ranges::any_of(done, [&](const Eigen::Vector3d& position) {
       return (position - pose.Translation()).norm() < 0.5 * reach_m;
     });
@@ -165,57 +121,45 @@ void Mapper::JoinPasses() {
   }
 }
 
-void Mapper::Visit(int keyframe, int steps) {
-  if (!config_.IsRefined()) return;
+void Mapper::Visit(int keyframe, int steps, const std::function<bool()>& stop) {
+  if (!config_.IsRefined() || steps == 0) return;
   const ScopedTimer timer(times_, "optimize");
-  for (int i = 0; i < steps; ++i) {
+  StepReport report;
+  int taken = 0;
+  while (taken < steps && !(taken > 0 && stop())) {
     const bool surface_normals = steps_ >= config_.engine.loss.surface_normal_start;
-    map_.Engine().Step(keyframe, surface_normals);
+    report = map_.Engine().Step(keyframe, surface_normals);
     ++steps_;
+    ++taken;
   }
+  views_.Trained(keyframe, taken, report.Loss());
 }
 
 void Mapper::OptimizeNewest() {
-  if (views_.empty()) return;
+  if (views_.Empty()) return;
   const ScheduleConfig& schedule = config_.schedule;
-  Visit(views_.back().keyframe, schedule.steps_new);
-  Visit(RandomNearView(), schedule.steps_near);
-  Visit(RandomView(), schedule.steps_old);
+  Visit(views_.Newest(), schedule.steps_new);
+  Visit(views_.RandomNear(), schedule.steps_near);
+  Visit(views_.Random(), schedule.steps_old);
 }
 
 void Mapper::OptimizeHurriedly() {
-  if (!views_.empty()) Visit(views_.back().keyframe, config_.schedule.steps_hurried);
+  if (!views_.Empty()) Visit(views_.Newest(), config_.schedule.steps_hurried);
 }
 
-void Mapper::OptimizeIdle() {
-  if (views_.empty()) return;
-  const bool near = rng_.Uniform() < 0.5;
-  Visit(near ? RandomNearView() : RandomView(), config_.schedule.steps_per_visit);
+void Mapper::OptimizeIdle(const std::function<bool()>& stop) {
+  if (!views_.Empty()) Visit(views_.Neediest(), config_.schedule.steps_per_visit, stop);
 }
 
 void Mapper::Conclude() {
-  if (views_.empty()) return;
+  if (views_.Empty()) return;
   if (map_.Keyframes() % config_.manage.interval != 0) Manage();
   if (T_map_odom_) JoinPasses();
   for (int left = config_.schedule.final_steps; left > 0;
        left -= config_.schedule.steps_per_visit) {
-    Visit(RandomView(), std::min(left, config_.schedule.steps_per_visit));
+    Visit(views_.Random(), std::min(left, config_.schedule.steps_per_visit));
   }
-}
-
-int Mapper::RandomView() { return views_[rng_.Below(views_.size())].keyframe; }
-
-int Mapper::RandomNearView() {
-  std::vector<std::pair<double, int>> by_distance;
-  by_distance.reserve(views_.size());
-  for (const View& view : views_) {
-    by_distance.emplace_back(Distance(view, views_.back()), view.keyframe);
-  }
-  const std::size_t near = std::min(by_distance.size(), kNearViews);
-  std::partial_sort(by_distance.begin(),
-                    by_distance.begin() + static_cast<std::ptrdiff_t>(near),
-                    by_distance.end());
-  return by_distance[rng_.Below(near)].second;
+  views_.ForgetAll();
 }
 
 std::shared_ptr<const RegistrationTarget> Mapper::MakeTarget(const SE3& T_odom_sensor) {

@@ -2,48 +2,15 @@
 // when.
 #pragma once
 
-#include "covsplat/core/rng.hpp"
+#include <functional>
+
 #include "covsplat/core/stage_times.hpp"
 #include "covsplat/mapping/feedback.hpp"
 #include "covsplat/mapping/manage.hpp"
 #include "covsplat/mapping/reliability.hpp"
+#include "covsplat/mapping/training_views.hpp"
 
 namespace covsplat {
-
-struct ScheduleConfig {
-  int steps_new = 10;
-  int steps_near = 10;
-  int steps_old = 0;
-  int steps_hurried = 3;
-  int steps_per_visit = 10;
-  int final_steps = 0;
-  double view_spacing_m = 1.0;
-
-  template <class Self, class V>
-  static void Visit(Self& c, V&& v) {
-    v.Field("steps_new", c.steps_new, Range{0, 10000}, "optimiser steps on each new keyframe");
-    v.Field(
-        "steps_near", c.steps_near, Range{0, 10000}, "... then on one of the views nearest to it");
-    v.Field("steps_old", c.steps_old, Range{0, 10000}, "... then on one of all views");
-    v.Field("steps_hurried",
-            c.steps_hurried,
-            Range{0, 10000},
-            "these on the newest instead of all that, while more keyframes wait (threaded only)");
-    v.Field("steps_per_visit",
-            c.steps_per_visit,
-            Range{1, 1000},
-            "steps on one view before idle time goes to another");
-    v.Field("final_steps",
-            c.final_steps,
-            Range{0, 10000000},
-            "steps over all views when the recording has ended");
-    v.Field("view_spacing_m",
-            c.view_spacing_m,
-            Range{0.0, 100.0},
-            "views nearer than this to another one are forgotten: memory is bounded by the places "
-            "that were seen, not by time");
-  }
-};
 
 struct MapperConfig {
   bool IsRefined() const { return feedback.mode != FeedbackMode::kFrozen; }
@@ -81,9 +48,10 @@ class Mapper {
   void OptimizeNewest();
   /// The few steps there is time for while more keyframes wait.
   void OptimizeHurriedly();
-  /// One visit of a view for idle time: the newest ones more often than old ones.
-  void OptimizeIdle();
-  /// When the recording has ended: a last round of management, and `schedule.final_steps`.
+  /// One visit of the view with most to gain, for idle time; cut short when `stop` says so.
+  void OptimizeIdle(const std::function<bool()>& stop = [] { return false; });
+  /// When the recording has ended: a last round of management, and `schedule.final_steps`. Views
+  /// are then given up.
   void Conclude();
 
   /// The registration target around a pose, in the frame of odometry.
@@ -101,36 +69,26 @@ class Mapper {
   RenderOutput Render(const SE3& T_map_sensor) { return map_.Engine().Render(T_map_sensor); }
 
   std::int64_t Steps() const { return steps_; }
-  /// Keyframes whose measurements are still there to optimise by; the last is the newest.
-  std::vector<int> Views() const;
+  /// Keyframes whose measurements are still there to optimise by, and what was done by all.
+  const TrainingViews& Views() const { return views_; }
   /// Time since the last call, by stage.
   StageTimes TakeTimes() { return std::exchange(times_, {}); }
 
  private:
-  struct View {
-    int keyframe;
-    double travelled_m;  ///< from the first keyframe to this one
-  };
-
-  double Distance(const View& a, const View& b) const;
   void MaskMoved(Keyframe& keyframe);
   PatchFit FindPatches(const Keyframe& keyframe, const NearGaussians& near) const;
   void Spawn(const Keyframe& keyframe);
-  void AddView(int keyframe);
-  void ThinViews();
   void Manage();
   void JoinPasses();
-  void Visit(int keyframe, int steps);
-  int RandomView();
-  int RandomNearView();
+  void Visit(
+      int keyframe, int steps, const std::function<bool()>& stop = [] { return false; });
 
   const SensorModel sensor_;
   const MapperConfig config_;
   ThreadPool& pool_;
   GaussianMap map_;
   FreeSpace free_space_;
-  std::vector<View> views_;  ///< oldest first
-  Rng rng_{20250711};
+  TrainingViews views_;
   std::int64_t steps_ = 0;
   StageTimes times_;
   std::optional<SE3> T_map_odom_;

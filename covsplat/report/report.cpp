@@ -24,6 +24,7 @@ std::string MakeReport(const ReportData& data) {
   page += internal::MapSection(data);
   page += internal::HeldOutSection(data);
   page += internal::TimingSection(data);
+  page += internal::TrainingSection(data);
   page += internal::GrowthSection(data);
   page += internal::DetailsSection(data);
   page +=

@@ -20,6 +20,7 @@ namespace covsplat {
 struct ReportSummary {
   std::int64_t scans = 0;
   std::int64_t lost_scans = 0;     ///< tracked without success
+  std::int64_t late_scans = 0;     ///< waited for the run
   std::int64_t dropped_scans = 0;  ///< never tracked: the input was faster than the run
   std::int64_t keyframes = 0;
   double path_length_m = 0.0;
@@ -70,9 +71,11 @@ struct ReportData {
   std::vector<ReportPicture> map_pictures;
   std::vector<HeldOutScan> held_out;
 
-  std::vector<StackLayer> stage_ms;  ///< per stage, ms of every scan
-  std::vector<double> gaussians;     ///< per scan
-  std::vector<double> rss_bytes;     ///< per scan
+  std::vector<StackLayer> stage_ms;    ///< per stage, ms of every scan
+  std::vector<double> latency_ms;      ///< per scan
+  std::vector<double> keyframe_steps;  ///< per keyframe: optimiser steps on its view
+  std::vector<double> gaussians;       ///< per scan
+  std::vector<double> rss_bytes;       ///< per scan
 
   std::vector<ReportEvent> events;
   std::string config_yaml;

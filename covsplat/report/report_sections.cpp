@@ -78,7 +78,7 @@ std::string TrajectoryPlot(const ReportData& data,
 }
 
 /// y over 0, 1, 2, ...
-Series PerScan(const std::vector<double>& values, double scale, int color) {
+Series PerIndex(const std::vector<double>& values, double scale, int color) {
   Series series;
   for (std::size_t i = 0; i < values.size(); ++i) {
     series.x.push_back(static_cast<double>(i));
@@ -123,6 +123,36 @@ std::string StageTable(const std::vector<StackLayer>& stages) {
          rows + "</table>";
 }
 
+std::string StagesPlot(const std::vector<StackLayer>& stage_ms) {
+  return StackedSvg({.title = "Time per scan",
+                     .x_label = "scan",
+                     .y_label = "ms",
+                     .width_px = 1120,
+                     .height_px = 300},
+                    stage_ms) +
+         StageTable(stage_ms);
+}
+
+std::string LatencyPlot(const std::vector<double>& latency_ms) {
+  const std::vector<double> ms = FiniteOnly(latency_ms);
+  const std::string plot = PlotSvg({.title = "Latency, from scan in to pose out",
+                                    .x_label = "scan",
+                                    .y_label = "ms",
+                                    .width_px = 1120,
+                                    .height_px = 220,
+                                    .y_from_zero = true},
+                                   std::vector<Series>{PerIndex(latency_ms, 1.0, 0)});
+  const std::string values = fmt::format("<td>{}</td><td>{}</td><td>{}</td><td>{}</td>",
+                                         FormatNumber(Quantile(ms, 0.5)),
+                                         FormatNumber(Quantile(ms, 0.95)),
+                                         FormatNumber(Quantile(ms, 0.99)),
+                                         FormatNumber(Quantile(ms, 1.0)));
+  return plot +
+         "<table><tr><th>latency</th><th>median (ms)</th><th>95 % (ms)</th><th>99 % (ms)</th>"
+         "<th>most (ms)</th></tr><tr><td>all scans</td>" +
+         values + "</tr></table>";
+}
+
 std::string DetailRow(const std::string& what, const std::string& value, bool code = false) {
   if (value.empty()) return "";
   return fmt::format("<tr><td class='key'>{}</td><td class='text'>{}{}{}</td></tr>",
@@ -144,11 +174,18 @@ std::string TilesSection(const ReportData& data) {
   const ReportSummary& s = data.summary;
   const auto count = [](std::int64_t n) { return FormatCount(static_cast<double>(n)); };
   std::string lost = s.lost_scans == 0 ? "none lost" : count(s.lost_scans) + " lost";
+  if (s.late_scans > 0) lost += ", " + count(s.late_scans) + " late";
   if (s.dropped_scans > 0) lost += ", " + count(s.dropped_scans) + " dropped";
   std::string html = Tile("Scans", count(s.scans), lost, s.lost_scans + s.dropped_scans > 0);
   html += Tile("Path", FormatMetres(s.path_length_m), "length of the trajectory");
   html +=
       Tile("Speed", FormatNumber(s.scans_per_s) + " scan/s", FormatSeconds(s.wall_s) + " in all");
+  if (!data.latency_ms.empty()) {
+    const std::vector<double> ms = FiniteOnly(data.latency_ms);
+    html += Tile("Latency",
+                 FormatNumber(Quantile(ms, 0.99)) + " ms",
+                 "scan in to pose out, 99 % of the scans");
+  }
   if (s.ate_rmse_m) {
     html += Tile("Trajectory error", FormatMetres(*s.ate_rmse_m), "ATE RMSE to the ground truth");
   }
@@ -212,14 +249,30 @@ std::string MapSection(const ReportData& data) {
 }
 
 std::string TimingSection(const ReportData& data) {
-  if (data.stage_ms.empty()) return "";
-  const std::string plot = StackedSvg({.title = "Time per scan",
-                                       .x_label = "scan",
-                                       .y_label = "ms",
-                                       .width_px = 1120,
-                                       .height_px = 300},
-                                      data.stage_ms);
-  return Card("Timing", "", plot + StageTable(data.stage_ms));
+  if (data.stage_ms.empty() && data.latency_ms.empty()) return "";
+  std::string html;
+  if (!data.stage_ms.empty()) html += StagesPlot(data.stage_ms);
+  if (!data.latency_ms.empty()) html += LatencyPlot(data.latency_ms);
+  return Card("Timing", "", html);
+}
+
+std::string TrainingSection(const ReportData& data) {
+  if (data.keyframe_steps.empty()) return "";
+  Series steps = PerIndex(data.keyframe_steps, 1.0, 1);
+  steps.style = Series::Style::kPoints;
+  const std::string plot = PlotSvg({.title = "Optimiser steps per keyframe",
+                                    .x_label = "keyframe",
+                                    .y_label = "steps",
+                                    .width_px = 1120,
+                                    .height_px = 260,
+                                    .y_from_zero = true},
+                                   std::vector<Series>{std::move(steps)});
+  const std::vector<double> all = FiniteOnly(data.keyframe_steps);
+  const std::string spread = fmt::format("Least {}, median {}, most {}.",
+                                         FormatCount(Quantile(all, 0.0)),
+                                         FormatCount(Quantile(all, 0.5)),
+                                         FormatCount(Quantile(all, 1.0)));
+  return Card("Optimisation", spread, plot);
 }
 
 std::string GrowthSection(const ReportData& data) {
@@ -236,8 +289,8 @@ std::string GrowthSection(const ReportData& data) {
   return Card("Growth",
               "",
               "<div class='columns'>" +
-                  plot("Gaussians", "thousands", PerScan(data.gaussians, 1e-3, 0)) +
-                  plot("Memory", "MB", PerScan(data.rss_bytes, 1e-6, 4)) + "</div>");
+                  plot("Gaussians", "thousands", PerIndex(data.gaussians, 1e-3, 0)) +
+                  plot("Memory", "MB", PerIndex(data.rss_bytes, 1e-6, 4)) + "</div>");
 }
 
 std::string EventsSection(const ReportData& data) {

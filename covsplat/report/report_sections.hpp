@@ -12,6 +12,7 @@ std::string TrajectorySection(const ReportData& data);
 std::string MapSection(const ReportData& data);
 std::string HeldOutSection(const ReportData& data);
 std::string TimingSection(const ReportData& data);
+std::string TrainingSection(const ReportData& data);
 std::string GrowthSection(const ReportData& data);
 std::string EventsSection(const ReportData& data);
 std::string DetailsSection(const ReportData& data);

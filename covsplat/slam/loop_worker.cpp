@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "covsplat/core/background.hpp"
+
 namespace covsplat {
 namespace {
 
@@ -14,6 +16,7 @@ LoopWorker::LoopWorker(const LoopConfig& config, bool threaded)
     : pool_(1), closer_(config, pool_), keyframes_(kQueue) {
   if (!threaded) return;
   thread_ = std::jthread([this] {
+    GoToBackground();
     while (std::optional<LoopKeyframe> keyframe = keyframes_.Pop()) Add(std::move(*keyframe));
   });
 }

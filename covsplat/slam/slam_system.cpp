@@ -4,6 +4,7 @@
 #include <iterator>
 #include <utility>
 
+#include "covsplat/core/background.hpp"
 #include "covsplat/core/check.hpp"
 
 namespace covsplat {
@@ -39,6 +40,25 @@ ScanRecord MakeRecord(const TrackResult& result) {
   record.degenerate_directions = result.align.degenerate_directions;
   record.times = result.times;
   return record;
+}
+
+struct Pools {
+  std::unique_ptr<ThreadPool> track;
+  std::unique_ptr<ThreadPool> map;
+};
+
+/// In lockstep each has all threads. Otherwise tracking has half of them, and mapping the rest, or,
+/// where there are no more processors than threads, as many as there are: it then takes all that
+/// tracking leaves.
+Pools MakePools(const SystemConfig& config) {
+  const int processors = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  const int all = config.threads > 0 ? config.threads : processors;
+  if (config.schedule == Schedule::kLockstep) {
+    return {std::make_unique<ThreadPool>(all), std::make_unique<ThreadPool>(all)};
+  }
+  const int tracking = (all + 1) / 2;
+  const int mapping = all < processors ? std::max(1, all - tracking) : all;
+  return {std::make_unique<ThreadPool>(tracking), MakeBackgroundPool(mapping)};
 }
 
 /// Gaussians as flat pieces of surface.
@@ -77,14 +97,7 @@ LoopKeyframe LoopKeyframeOf(int keyframe, const TrackedScan& tracked, double vox
 Result<std::unique_ptr<SlamSystem>> SlamSystem::Create(const SlamConfig& config,
                                                        const SensorModel& sensor) {
   if (const Result<void> valid = CheckSlamConfig(config); !valid) return Forward(valid);
-  const int all = config.system.threads > 0
-                      ? config.system.threads
-                      : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  const bool lockstep = config.system.schedule == Schedule::kLockstep;
-  const int mapping = lockstep ? all : std::max(1, all / 2);
-  const int tracking = lockstep ? all : std::max(1, all - mapping);
-  auto track_pool = std::make_unique<ThreadPool>(tracking);
-  auto map_pool = std::make_unique<ThreadPool>(mapping);
+  auto [track_pool, map_pool] = MakePools(config.system);
   auto engine = MakeSplatEngine(config.system.backend, sensor, config.mapper.engine, *map_pool);
   if (!engine) return Forward(engine);
   return std::unique_ptr<SlamSystem>(new SlamSystem(
@@ -248,7 +261,7 @@ void SlamSystem::MapperLoop() {
       continue;
     }
     if (keyframes_.Closed()) return;
-    mapper_.OptimizeIdle();
+    mapper_.OptimizeIdle([this] { return !keyframes_.Empty() || keyframes_.Closed(); });
     if (config_.loops.mode == LoopMode::kOn) Correct();
     if (++idle_visits % kVisitsPerTarget == 0) PublishTarget();
     AddTimes(mapper_times_, mapper_.TakeTimes());
@@ -288,6 +301,9 @@ void SlamSystem::Finish() {
   Correct();
   StitchPasses();
   AddTimes(mapper_times_, last_times);
+  map_memory_ = {.gaussians_bytes = mapper_.Map().Bytes(),
+                 .views_bytes = mapper_.Views().Bytes(),
+                 .places_bytes = loops_ ? loops_->Closer().PlacesBytes() : 0};
   mapper_.Conclude();
   AddTimes(mapper_times_, mapper_.TakeTimes());
   gaussians_ = mapper_.Map().Size();

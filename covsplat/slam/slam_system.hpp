@@ -37,6 +37,13 @@ struct ScanRecord {
   StageTimes times;                ///< of the tracker, and in lockstep of the mapper
 };
 
+/// What of the map grows with the way, in bytes.
+struct MapMemory {
+  std::size_t gaussians_bytes = 0;  ///< with what optimisation and tracking know of them
+  std::size_t views_bytes = 0;
+  std::size_t places_bytes = 0;  ///< to be known again
+};
+
 /// A scan kept out of the map to measure it by.
 struct HeldOut {
   std::int64_t scan = 0;
@@ -75,6 +82,8 @@ class SlamSystem {
   const std::vector<std::int64_t>& KeyframeScans() const { return keyframe_scans_; }
   /// Time the mapper spent per stage; after Finish.
   const StageTimes& MapperTimes() const { return mapper_times_; }
+  /// After Finish.
+  const MapMemory& MemoryOfMap() const { return map_memory_; }
 
  private:
   struct OdometryPose {
@@ -120,6 +129,7 @@ class SlamSystem {
   // Owned by the mapper thread while it runs, by the calling thread otherwise.
   Mapper mapper_;
   StageTimes mapper_times_;
+  MapMemory map_memory_;
   SE3 T_odom_newest_;                  ///< of the newest keyframe
   std::unique_ptr<LoopWorker> loops_;  ///< null if off
 

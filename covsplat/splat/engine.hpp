@@ -46,6 +46,8 @@ struct StepReport {
   double opacity_loss = 0.0;
   double normal_loss = 0.0;
   std::size_t pairs = 0;  ///< (Gaussian, tile) pairs: the size of the work
+
+  double Loss() const { return range_loss + opacity_loss + normal_loss; }
 };
 
 /// Gaussians in the frames of their anchors (keyframes), and the training views of those anchors.

@@ -44,7 +44,7 @@ KeptRows KeepRows(std::span<const AnchorRange> ranges, std::span<const std::uint
     now.end = rows.size();
     if (now.end == now.begin) continue;
     kept.ranges.push_back(now);
-    rows.resize(RoundUpToBlock(now.end), rows[now.begin]);
+    while (rows.size() < RoundUpToBlock(now.end)) rows.push_back(rows.size());
   }
   return kept;
 }

@@ -19,7 +19,7 @@ inline std::size_t RoundUpToBlock(std::size_t rows) {
 void MakeInert(GaussianColumns<float>& table, std::size_t begin, std::size_t end);
 
 /// What remains of a table: new ranges, one for each anchor that has Gaussians, ascending, and for
-/// each new row its old row. Rows of an anchor keep their order; padding rows point to one of them.
+/// each new row its old row. Rows of an anchor keep their order; padding rows point to themselves.
 struct KeptRows {
   std::vector<AnchorRange> ranges;
   std::vector<std::size_t> old_row;

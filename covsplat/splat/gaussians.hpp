@@ -7,6 +7,7 @@
 #include <span>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -14,6 +15,25 @@
 #include "covsplat/splat/parameters.hpp"
 
 namespace covsplat {
+
+/// Without the half that vectors leave free at worst when they grow: tables are large.
+template <class T, class Allocator>
+void ResizeTightly(std::vector<T, Allocator>& values, std::size_t size) {
+  if (size > values.capacity()) values.reserve(size + size / 8);
+  values.resize(size);
+}
+
+/// Value i becomes what value old_row[i] was; what stays where it is costs nothing.
+template <class T, class Allocator>
+void GatherRows(std::span<const std::size_t> old_row, std::vector<T, Allocator>& values) {
+  std::size_t same = 0;
+  while (same < old_row.size() && old_row[same] == same) ++same;
+  std::vector<T> moved;
+  moved.reserve(old_row.size() - same);
+  for (const std::size_t i : old_row.subspan(same)) moved.push_back(values[i]);
+  values.resize(same);
+  values.insert(values.end(), moved.begin(), moved.end());
+}
 
 /// Equally long columns, each followed by kBlockSize readable values.
 template <class S, int kColumns>
@@ -23,7 +43,7 @@ class ColumnTable {
 
   void Resize(std::size_t size) {
     size_ = size;
-    for (auto& column : columns_) column.resize(size + kBlockSize);
+    for (auto& column : columns_) ResizeTightly(column, size + kBlockSize);
   }
 
   S* Column(int column) { return columns_[static_cast<std::size_t>(column)].data(); }
@@ -32,9 +52,8 @@ class ColumnTable {
   /// Row i becomes what row old_row[i] was.
   void Gather(std::span<const std::size_t> old_row) {
     for (auto& column : columns_) {
-      AlignedVector<S> gathered(old_row.size() + kBlockSize);
-      for (std::size_t i = 0; i < old_row.size(); ++i) gathered[i] = column[old_row[i]];
-      column = std::move(gathered);
+      GatherRows(old_row, column);
+      ResizeTightly(column, old_row.size() + kBlockSize);
     }
     size_ = old_row.size();
   }

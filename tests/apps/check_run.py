@@ -19,7 +19,7 @@ from cases import LIMIT_S, binary, case, expect, run_cases
 
 SCANS = 12
 SMALL = ["-s", "lidar.rows=32", "-s", "lidar.columns=256"]
-FILES = ["config.yaml", "frames.csv", "keyframes_tum.txt", "map.ply", "metrics.json", "report.html",
+FILES = ["config.yaml", "frames.csv", "keyframes.csv", "keyframes_tum.txt", "map.ply", "metrics.json", "report.html",
          "trajectory_kitti.txt", "trajectory_tum.txt"]
 
 
@@ -99,6 +99,14 @@ def a_good_run_writes_everything(bench):
     found = metrics(out)
     assert found["trajectory_error"]["ate_translation_m"]["rmse"] < 0.1, found["trajectory_error"]
     assert found["scans"]["lost"] == 0
+    latency = found["time"]["latency_ms"]
+    assert 0 < latency["p50"] <= latency["p95"] <= latency["p99"] <= latency["max"], latency
+    assert found["memory"]["views_bytes"] > 0 and found["memory"]["places_bytes"] > 0
+    rows = (out / "keyframes.csv").read_text().splitlines()[1:]
+    steps = [int(row.split(",")[2]) for row in rows]
+    assert len(steps) == found["map"]["keyframes"], rows
+    assert sum(steps) == found["map"]["optimizer_steps"], rows
+    assert found["map"]["steps_per_keyframe"]["max"] == max(steps), found["map"]
     expect(bench.call("info", out / "map.ply", "--json"), 0, out='"gaussians"')
     expect(bench.call("info", out), 0, out="gaussians")
     expect(bench.call("eval", "traj", out / "trajectory_tum.txt",

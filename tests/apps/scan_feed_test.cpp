@@ -35,7 +35,7 @@ std::unique_ptr<ScanFeed> FeedOf(std::vector<double> stamps, std::int64_t jump =
 
 std::vector<std::int64_t> Drain(ScanFeed& feed) {
   std::vector<std::int64_t> scans;
-  while (const std::optional<Scan> scan = feed.Next()) scans.push_back(scan->index);
+  while (const auto fed = feed.Next()) scans.push_back(fed->scan.index);
   return scans;
 }
 
@@ -69,8 +69,8 @@ TEST(ScanFeedTest, RealtimeKeepsTheNewestScanAndCountsTheOthers) {
   const auto feed = MakeRealtimeFeed(FeedOf(stamps), [] { return false; });
   const auto start = std::chrono::steady_clock::now();
   std::vector<std::int64_t> scans;
-  while (const std::optional<Scan> scan = feed->Next()) {
-    scans.push_back(scan->index);
+  while (const auto fed = feed->Next()) {
+    scans.push_back(fed->scan.index);
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
@@ -79,6 +79,22 @@ TEST(ScanFeedTest, RealtimeKeepsTheNewestScanAndCountsTheOthers) {
   EXPECT_TRUE(std::is_sorted(scans.begin(), scans.end()));
   EXPECT_GT(feed->Counts().dropped, 10);
   EXPECT_EQ(feed->Counts().dropped + static_cast<std::int64_t>(scans.size()), 40);
+  EXPECT_GT(feed->Counts().late, 5);
+  EXPECT_LE(feed->Counts().late, static_cast<std::int64_t>(scans.size()));
+}
+
+TEST(ScanFeedTest, RealtimeScansArriveAtTheTimesOfTheirStampsHoweverLateTheyAreTaken) {
+  const auto feed = MakeRealtimeFeed(FeedOf({5.0, 5.01, 5.04}), [] { return false; });
+  std::vector<std::chrono::steady_clock::time_point> arrivals;
+  while (const auto fed = feed->Next()) {
+    arrivals.push_back(fed->arrival);
+    if (arrivals.size() == 1) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  ASSERT_EQ(arrivals.size(), 2u) << "the second was overtaken";
+  const std::chrono::duration<double> apart = arrivals[1] - arrivals[0];
+  EXPECT_NEAR(apart.count(), 0.04, 1e-6);
+  EXPECT_EQ(feed->Counts().late, 1);
+  EXPECT_EQ(feed->Counts().dropped, 1);
 }
 
 TEST(ScanFeedTest, RealtimeCanBeAbandoned) {

@@ -67,6 +67,18 @@ TEST_F(LoopCloserTest, ALapThatDriftedIsClosed) {
   EXPECT_LT(worst, 0.5 * drift);
 }
 
+TEST_F(LoopCloserTest, LittleMemoryOfPlacesIsEnoughToCloseALap) {
+  LoopCloser whole({}, pool_);
+  Drive(whole, kLap + 20, Drift(2e-4, 0.004));
+  LoopConfig config;
+  config.max_places_mb = 0.5 * static_cast<double>(whole.PlacesBytes()) / 1e6;
+  LoopCloser bounded(config, pool_);
+  Drive(bounded, kLap + 20, Drift(2e-4, 0.004));
+  EXPECT_LE(static_cast<double>(bounded.PlacesBytes()), 1e6 * config.max_places_mb);
+  EXPECT_GE(bounded.Count(LoopFate::kAccepted), 2);
+  EXPECT_EQ(bounded.Count(LoopFate::kUndone), 0);
+}
+
 TEST_F(LoopCloserTest, WithoutDriftNothingMoves) {
   LoopCloser closer({}, pool_);
   Drive(closer, kLap + 10, Drift(0.0, 0.0));

@@ -93,6 +93,20 @@ TEST_F(MapperTest, SpendsItsBudgetAndNoMore) {
   EXPECT_EQ(mapper->Steps(), 10);
   mapper->Conclude();
   EXPECT_EQ(mapper->Steps(), 20) << "10 in visits of 4, 4 and 2";
+  EXPECT_EQ(mapper->Views().Training()[0].steps, 20);
+  EXPECT_TRUE(mapper->Views().Empty()) << "nothing more will come";
+}
+
+TEST_F(MapperTest, StopsAVisitWhenThereIsSomethingElseToDo) {
+  MapperConfig config;
+  config.schedule.steps_per_visit = 8;
+  const auto mapper = MakeMapper(config);
+  mapper->Insert(KeyframeAt(0));
+  int asked = 0;
+  mapper->OptimizeIdle([&] { return ++asked == 3; });
+  EXPECT_EQ(mapper->Steps(), 3);
+  mapper->OptimizeIdle([] { return true; });
+  EXPECT_EQ(mapper->Steps(), 4) << "a visit has one step at least";
 }
 
 TEST_F(MapperTest, KeepsOneViewOfAPlace) {
@@ -107,7 +121,7 @@ TEST_F(MapperTest, KeepsOneViewOfAPlace) {
                                  static_cast<std::uint64_t>(seed),
                                  pool_));
     mapper->OptimizeNewest();
-    return mapper->Views();
+    return mapper->Views().Keyframes();
   };
   using Views = std::vector<int>;
   EXPECT_EQ(go_to(0.0, 0), (Views{0}));

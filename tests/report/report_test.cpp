@@ -12,11 +12,15 @@ bool Contains(const std::string& page, const std::string& part) {
 
 TEST(Report, ShowsEverySectionThatHasData) {
   const std::string page = MakeReport(SampleReport());
-  for (const char* title : {"Trajectory", "Map", "Held-out scans", "Timing", "Growth", "Events"}) {
+  for (const char* title :
+       {"Trajectory", "Map", "Held-out scans", "Timing", "Optimisation", "Growth", "Events"}) {
     EXPECT_TRUE(Contains(page, std::string("<h2>") + title + "</h2>")) << title;
   }
   EXPECT_TRUE(Contains(page, "184 213"));
   EXPECT_TRUE(Contains(page, "8.3 mm"));
+  EXPECT_TRUE(Contains(page, "Latency"));
+  EXPECT_TRUE(Contains(page, "Optimiser steps per keyframe"));
+  EXPECT_TRUE(Contains(page, "2 lost, 1 late"));
   EXPECT_TRUE(Contains(page, "ground truth"));
   EXPECT_TRUE(Contains(page, "max_iterations: 30"));
 }

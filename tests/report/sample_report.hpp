@@ -60,7 +60,7 @@ inline ReportData SampleReport() {
   ReportData data;
   data.title = "courtyard";
   data.subtitle = "Simulated handheld recording, 64 x 1024, 420 scans in 42 s";
-  data.summary = {kScans, 2, 0, 35, 76.4, 12.7, 33.1, 184213, 21.3e6, 412e6, 455e6, 0.0083};
+  data.summary = {kScans, 2, 1, 0, 35, 76.4, 12.7, 33.1, 184213, 21.3e6, 412e6, 455e6, 0.0083};
   AddSampleTrajectory(data, kScans);
   data.map_pictures = {{"From above, 10 cm per pixel, colour is height", SamplePicture(420, 560)},
                        {"From scan 210, colour is the normal", SamplePicture(420, 560)}};
@@ -76,7 +76,9 @@ inline ReportData SampleReport() {
     for (int i = 0; i < kScans; ++i)
       data.stage_ms.back().values.push_back(ms * (0.8 + 0.4 * rng.Uniform()));
   }
+  for (int k = 0; k < 35; ++k) data.keyframe_steps.push_back(20.0 + 400.0 / (1 + k));
   for (int i = 0; i < kScans; ++i) {
+    data.latency_ms.push_back(34.0 + 8.0 * rng.Uniform());
     data.gaussians.push_back(184213 * (1 - std::exp(-0.008 * i)));
     data.rss_bytes.push_back(180e6 + 232e6 * (1 - std::exp(-0.007 * i)));
   }

@@ -29,6 +29,8 @@ ReportData HostileReport() {
   data.held_out = {{1, kNan, 0.0, Image<float>(2, 4, NAN), Image<float>(2, 4, INFINITY)},
                    {2, 0.0, kInf, Image<float>(2, 4, 1.0F), Image<float>(1, 4, 1.0F)}};
   data.stage_ms = {{data.title, {1, kNan, kInf, -5}}, {"", {}}, {"late", {1, 2, 3, 4, 5, 6}}};
+  data.latency_ms = {kNan, kInf, 3.0};
+  data.keyframe_steps = {kNan, kInf};
   data.gaussians = {kNan, kNan};
   data.rss_bytes = {kInf, 1e300, -1e300};
   return data;
