@@ -1,6 +1,6 @@
 # The short way to everything; CMake presets do the work.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test cuda bench bench-instructions bench-peers bench-ablation bench-growth bench-loops bench-loop-seeds oracles check-map format tidy docs clean
+.PHONY: help setup demo test cuda bench bench-instructions bench-peers bench-realtime bench-ablation bench-growth bench-loops bench-loop-seeds oracles check-map format tidy docs clean
 
 COVSPLAT_DATA ?= ../shared/data
 THREADS ?= 2
@@ -62,6 +62,12 @@ bench-peers: setup build-release .venv/peers $(addprefix simulate-,$(WORLDS))  #
 	.venv/bin/python bench/peers/run.py --covsplat build/release/apps/covsplat \
 	  $(WORLDS:%=--recording bench_out/%) --no-map street --data $(COVSPLAT_DATA) \
 	  --azimuth-time kitti_raw_0005=0.1033 --threads $(THREADS) --out bench_out \
+	  $(if $(ONLY),--only '$(ONLY)',--update docs/benchmarks.md)
+
+bench-realtime: setup build-release .venv/peers simulate-courtyard simulate-college  ## Latency, dropped scans, tracking beside peers: docs/benchmarks.md
+	PYTHONPATH=bench/peers .venv/bin/python bench/realtime/run.py --covsplat build/release/apps/covsplat \
+	  --recording bench_out/courtyard --recording bench_out/college --data $(COVSPLAT_DATA) \
+	  --azimuth-time kitti_raw_0005=0.1033 --threads $(THREADS) --out bench_out/realtime \
 	  $(if $(ONLY),--only '$(ONLY)',--update docs/benchmarks.md)
 
 # Runs with the same program and settings are kept: interrupted, it goes on where it was.
