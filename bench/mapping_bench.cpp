@@ -40,6 +40,7 @@ std::unique_ptr<Mapper> MapOfTheCourtyard(ThreadPool& pool) {
   MapperConfig config;
   config.schedule.steps_new = kStepsEach;
   config.schedule.steps_near = 0;
+  config.schedule.max_steps_per_view = 0;
   auto engine = MakeSplatEngine(Backend::kCpu, Courtyard().Sensor(), config.engine, pool).value();
   auto mapper = std::make_unique<Mapper>(std::move(engine), Courtyard().Sensor(), config, pool);
   for (int k = 0; k < kKeyframes; ++k) {

@@ -147,8 +147,10 @@ void Mapper::OptimizeHurriedly() {
   if (!views_.Empty()) Visit(views_.Newest(), config_.schedule.steps_hurried);
 }
 
-void Mapper::OptimizeIdle(const std::function<bool()>& stop) {
-  if (!views_.Empty()) Visit(views_.Neediest(), config_.schedule.steps_per_visit, stop);
+bool Mapper::OptimizeIdle(const std::function<bool()>& stop) {
+  const std::optional<int> keyframe = views_.Neediest();
+  if (keyframe) Visit(*keyframe, config_.schedule.steps_per_visit, stop);
+  return keyframe.has_value();
 }
 
 void Mapper::Conclude() {

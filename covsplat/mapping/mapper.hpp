@@ -48,8 +48,9 @@ class Mapper {
   void OptimizeNewest();
   /// The few steps there is time for while more keyframes wait.
   void OptimizeHurriedly();
-  /// One visit of the view with most to gain, for idle time; cut short when `stop` says so.
-  void OptimizeIdle(const std::function<bool()>& stop = [] { return false; });
+  /// One visit of the view with most to gain, for idle time; cut short when `stop` says so. False
+  /// if there is none that more steps would do good.
+  bool OptimizeIdle(const std::function<bool()>& stop = [] { return false; });
   /// When the recording has ended: a last round of management, and `schedule.final_steps`. Views
   /// are then given up.
   void Conclude();

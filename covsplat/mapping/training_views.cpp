@@ -92,13 +92,19 @@ int TrainingViews::RandomNear() {
   return by_distance[rng_.Below(near)].second;
 }
 
-int TrainingViews::Neediest() const {
+std::optional<int> TrainingViews::Neediest() const {
   constexpr double kSoon = 10.0;  // steps in which much of what there is to gain is gained
-  const auto need = [&](const View& view) {
+  std::optional<int> neediest;
+  double most = 0.0;
+  for (const View& view : views_) {
     const KeyframeTraining& training = training_[static_cast<std::size_t>(view.keyframe)];
-    return training.loss / (static_cast<double>(training.steps) + kSoon);
-  };
-  return std::ranges::max_element(views_, {}, need)->keyframe;
+    if (config_.max_steps_per_view > 0 && training.steps >= config_.max_steps_per_view) continue;
+    const double need = training.loss / (static_cast<double>(training.steps) + kSoon);
+    if (neediest && !(need > most)) continue;
+    neediest = view.keyframe;
+    most = need;
+  }
+  return neediest;
 }
 
 std::vector<int> TrainingViews::Keyframes() const {

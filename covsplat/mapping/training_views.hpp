@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct ScheduleConfig {
   int steps_old = 0;
   int steps_hurried = 3;
   int steps_per_visit = 10;
+  int max_steps_per_view = 100;
   int final_steps = 0;
   double view_spacing_m = 1.0;
   double max_views_mb = 250.0;
@@ -36,6 +38,12 @@ struct ScheduleConfig {
             c.steps_per_visit,
             Range{1, 1000},
             "steps on one view before idle time goes to another");
+    v.Field(
+        "max_steps_per_view",
+        c.max_steps_per_view,
+        Range{0, 1000000},
+        "idle time goes to no view that has had so many: more would fit its measurements, noise "
+        "and all, at the cost of the surface; 0: no limit");
     v.Field("final_steps",
             c.final_steps,
             Range{0, 10000000},
@@ -80,8 +88,8 @@ class TrainingViews {
   int RandomNear();
   /// The one with most to gain: of large loss, and with few steps until now. So the newest go first
   /// until they have had what others have; a view of twice the loss gets about twice the steps, and
-  /// every view has its turn.
-  int Neediest() const;
+  /// every view has its turn. Nothing if all have had as many steps as are good for them.
+  std::optional<int> Neediest() const;
 
   /// Oldest first.
   std::vector<int> Keyframes() const;

@@ -252,18 +252,18 @@ void SlamSystem::PublishTarget() {
 
 void SlamSystem::MapperLoop() {
   int idle_visits = 0;
+  bool has_work = false;  // besides keyframes
   while (true) {
-    std::optional<TrackedScan> keyframe =
-        config_.mapper.IsRefined() && mapper_.Map().Keyframes() > 0 ? keyframes_.TryPop()
-                                                                    : keyframes_.Pop();
+    std::optional<TrackedScan> keyframe = has_work ? keyframes_.TryPop() : keyframes_.Pop();
     if (keyframe) {
       MapKeyframe(std::move(*keyframe), mapper_times_);
+      has_work = config_.mapper.IsRefined();
       continue;
     }
     if (keyframes_.Closed()) return;
-    mapper_.OptimizeIdle([this] { return !keyframes_.Empty() || keyframes_.Closed(); });
+    has_work = mapper_.OptimizeIdle([this] { return !keyframes_.Empty() || keyframes_.Closed(); });
     if (config_.loops.mode == LoopMode::kOn) Correct();
-    if (++idle_visits % kVisitsPerTarget == 0) PublishTarget();
+    if (++idle_visits % kVisitsPerTarget == 0 || !has_work) PublishTarget();
     AddTimes(mapper_times_, mapper_.TakeTimes());
   }
 }

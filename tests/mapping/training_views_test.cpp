@@ -53,16 +53,32 @@ TEST_F(TrainingViewsTest, TheNewestAreNeediest) {
 
 TEST_F(TrainingViewsTest, StepsGoToAllAndMostToWhatIsExplainedWorst) {
   const double losses[] = {0.1, 0.4, 0.2, 0.1};
-  TrainingViews views(map_, kPixels, {});
+  ScheduleConfig config;
+  config.max_steps_per_view = 0;
+  TrainingViews views(map_, kPixels, config);
   Drive(views, 4, 2.0);
   for (int visit = 0; visit < 800; ++visit) {
-    const int keyframe = views.Neediest();
+    const int keyframe = views.Neediest().value();
     views.Trained(keyframe, 1, losses[keyframe]);
   }
   for (int k = 0; k < 4; ++k) {
     const auto steps = static_cast<double>(views.Training()[static_cast<std::size_t>(k)].steps);
     EXPECT_NEAR(steps, 1000.0 * losses[k], 40.0) << k;
   }
+}
+
+TEST_F(TrainingViewsTest, RestsWhenAllHaveHadEnough) {
+  ScheduleConfig config;
+  config.max_steps_per_view = 30;
+  TrainingViews views(map_, kPixels, config);
+  EXPECT_FALSE(views.Neediest());
+  Drive(views, 3, 2.0);
+  int visits = 0;
+  for (; views.Neediest() && visits < 100; ++visits) views.Trained(*views.Neediest(), 10, 0.5);
+  EXPECT_EQ(visits, 9);
+  for (const KeyframeTraining& training : views.Training()) EXPECT_EQ(training.steps, 30);
+  Drive(views, 1, 2.0);
+  EXPECT_EQ(views.Neediest(), 3) << "a new one has had none";
 }
 
 TEST_F(TrainingViewsTest, RemembersWhatWasDoneByViewsThatItForgot) {
