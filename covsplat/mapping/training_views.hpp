@@ -19,7 +19,7 @@ struct ScheduleConfig {
   int steps_old = 0;
   int steps_hurried = 3;
   int steps_per_visit = 10;
-  int max_steps_per_view = 100;
+  int max_steps_per_view = 40;
   int final_steps = 0;
   double view_spacing_m = 1.0;
   double max_views_mb = 250.0;
