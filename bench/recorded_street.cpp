@@ -2,19 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <numbers>
 #include <span>
-#include <string>
+#include <utility>
 
+#include "tests/support/data.hpp"
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 #include <nanoflann.hpp>
 
 #include "covsplat/core/rng.hpp"
-#include "covsplat/core/se3.hpp"
+#include "covsplat/io/kitti_scan.hpp"
+#include "covsplat/io/trajectory_file.hpp"
 
 namespace covsplat {
 namespace {
@@ -42,34 +42,14 @@ SensorModel StreetSensor() {
                             kMaxRange);
 }
 
-fs::path RecordingFolder() {
-  const char* variable = std::getenv("COVSPLAT_DATA");  // NOLINT(concurrency-mt-unsafe)
-  const fs::path root =
-      variable != nullptr ? fs::path(variable) : fs::path(COVSPLAT_SOURCE_DIR) / "../shared/data";
-  return root / "kitti_raw_0005";
-}
-
-/// T_world_sensor of every scan: one row-major 3 x 4 matrix per line.
-std::vector<SE3> ReadPoses(const fs::path& path) {
-  std::ifstream file(path);
-  std::vector<SE3> poses;
-  Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
-  while (true) {
-    for (int i = 0; i < 12; ++i) file >> pose(i / 4, i % 4);
-    if (!file) return poses;
-    poses.push_back(SE3::FromMatrix(pose));
-  }
-}
-
+/// Nothing if the file is not there or damaged.
 std::vector<Eigen::Vector3f> ReadPoints(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::vector<Eigen::Vector3f> points;
-  float values[4];  // x y z intensity
-  while (file.read(reinterpret_cast<char*>(values), sizeof values)) {
-    const Eigen::Vector3f point(values[0], values[1], values[2]);
-    if (point.norm() > kMinRange && point.norm() < kMaxRange) points.push_back(point);
-  }
-  return points;
+  Result<Scan> scan = ReadKittiScan(path);
+  if (!scan) return {};
+  std::erase_if(scan->points, [](const Eigen::Vector3f& point) {
+    return !(point.norm() > kMinRange && point.norm() < kMaxRange);
+  });
+  return std::move(scan->points);
 }
 
 /// How nanoflann sees the points.
@@ -156,12 +136,14 @@ void SortByImage(const SensorModel& sensor, std::vector<Eigen::Vector3f>& points
 }  // namespace
 
 std::optional<RecordedStreet> RecordedStreet::Load() {
-  const fs::path folder = RecordingFolder();
+  const std::optional<fs::path> folder = TestData("kitti_raw_0005");
+  if (!folder) return std::nullopt;
   const auto scan_path = [&](int scan) {
-    return folder / "velodyne" / fmt::format("{:06d}.bin", scan);
+    return *folder / "velodyne" / fmt::format("{:06d}.bin", scan);
   };
-  const std::vector<SE3> poses = ReadPoses(folder / "poses_reference.txt");
-  if (poses.size() <= kLastScan) return std::nullopt;
+  const auto read = ReadKittiPoses(*folder / "poses_reference.txt");
+  if (!read || read->size() <= kLastScan) return std::nullopt;
+  const std::vector<SE3>& poses = *read;
   std::vector<Eigen::Vector3f> points;
   for (int scan = kFirstScan; scan <= kLastScan; scan += kScanStep) {
     const SE3 T_view_scan = poses[kViewScan].Inverse() * poses[static_cast<std::size_t>(scan)];

@@ -7,7 +7,6 @@ PYTHONPATH=bench/peers .venv/bin/python bench/loops/run.py --covsplat build/rele
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 from dataclasses import dataclass
 from functools import partial
@@ -19,10 +18,12 @@ import page
 import peers
 import report
 import track_runs
-from covsplat_run import base_command, mesh_of_run, score_mesh
+from covsplat_run import base_command
 from loop_measures import LoopFacts, loop_facts, thickness_m
+from map_runs import strict_f_percent
+from options import add_options, recordings
 from processes import apart, run_program
-from recording import Recording, azimuth_periods, marked
+from recording import Recording
 from report import number
 from se3 import Trajectory, ways_along
 
@@ -57,10 +58,8 @@ class Row:
 
 def main() -> int:
     options = parse()
-    periods = azimuth_periods(options.azimuth_time)
     rows = []
-    for folder in options.recording + marked(options.data, "*loop*"):
-        recording = Recording.open(folder, periods.get(folder.resolve().name))
+    for recording in recordings(options):
         rows += compared(recording, options)
     page.publish(f"\n{report.table(HEADER, list(map(cells, rows)))}\n", "loops", options.update)
     return 0
@@ -69,15 +68,7 @@ def main() -> int:
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--covsplat", type=Path, required=True, help="the binary")
-    parser.add_argument("--recording", type=Path, action="append", default=[], metavar="DIR")
-    parser.add_argument("--data", type=Path, metavar="DIR", help="also what it marks *loop*")
-    parser.add_argument("--azimuth-time", action="append", default=[], metavar="NAME=SECONDS")
-    parser.add_argument("--only", type=re.compile, default=re.compile(""), metavar="REGEX")
-    parser.add_argument("--voxel", type=float, default=0.1, metavar="METRES", help="of all meshes")
-    parser.add_argument("--no-map", action="append", default=[], metavar="NAME", help="recording")
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=Path("bench_out/loops"))
-    parser.add_argument("--update", type=Path, metavar="PAGE", help="write between its markers")
+    add_options(parser, out="bench_out/loops", mark="*loop*")
     return parser.parse_args()
 
 
@@ -115,9 +106,8 @@ def compared(recording: Recording, options: argparse.Namespace) -> list[Row]:
 
 
 def row_of(recording: Recording, method: str, trajectory: Trajectory) -> Row:
-    absolute_m, _ = track_runs.errors_of(trajectory, recording)
     way_m = float(ways_along(recording.truth().positions)[-1])
-    return Row(recording.name, way_m, method, track_runs.rms(absolute_m))
+    return Row(recording.name, way_m, method, track_runs.ate_m(trajectory, recording))
 
 
 def judged(recording: Recording, method: str, run: Path, options: argparse.Namespace) -> Row:
@@ -126,28 +116,8 @@ def judged(recording: Recording, method: str, run: Path, options: argparse.Names
     loops = loop_facts(closed, recording) if (closed / "loops.csv").is_file() else None
     apart_m = thickness_m(run)
     double = tuple(1e3 * np.percentile(apart_m, [50, 90])) if len(apart_m) else None
-    return Row(
-        row.recording, row.way_m, method, row.ate_m, loops, double, surface(recording, run, options)
-    )
-
-
-def surface(
-    recording: Recording, run: Path, options: argparse.Namespace
-) -> tuple[float, float] | None:
-    if recording.true_mesh is None or recording.name in options.no_map:
-        return None
-    mesh = run / "mesh.ply"
-    mesh_of_run(options.covsplat, run, mesh, options.voxel, options.threads)
-    score = score_mesh(
-        options.covsplat,
-        mesh,
-        recording,
-        (0.1, 0.05),
-        options.threads,
-        run / "trajectory_tum.txt",
-        voxel_m=0.05,
-    )
-    return score.strict.f_percent[0.1], score.strict.f_percent[0.05]
+    strict = strict_f_percent(recording, run, options, compared_voxel_m=0.05)
+    return Row(row.recording, row.way_m, method, row.ate_m, loops, double, strict)
 
 
 def cells(row: Row) -> list[str]:

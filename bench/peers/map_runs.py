@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -106,6 +107,29 @@ def mesh_covsplat(setting: Setting, name: str) -> map_peers.MapOutcome:
         metrics["map"]["file_bytes"] / 2**20,
         run / "trajectory_tum.txt",
     )
+
+
+def strict_f_percent(
+    recording: Recording,
+    run: Path,
+    options: argparse.Namespace,
+    compared_voxel_m: float | None = None,
+) -> tuple[float, float] | None:
+    """Of a run of covsplat, at 0.1 and 0.05 m; nothing where there is no truth or none is asked."""
+    if recording.true_mesh is None or recording.name in options.no_map:
+        return None
+    mesh = run / "mesh.ply"
+    mesh_of_run(options.covsplat, run, mesh, options.voxel, options.threads)
+    score = score_mesh(
+        options.covsplat,
+        mesh,
+        recording,
+        (0.1, 0.05),
+        options.threads,
+        run / "trajectory_tum.txt",
+        compared_voxel_m,
+    )
+    return score.strict.f_percent[0.1], score.strict.f_percent[0.05]
 
 
 def measure(setting: Setting, chosen: Sequence[tuple[str, Make]]) -> list[Row]:

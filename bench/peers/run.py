@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
 import shlex
 import sys
 from pathlib import Path
@@ -20,16 +19,15 @@ import plots
 import report
 import stages
 import track_runs
-from recording import Recording, azimuth_periods, marked
+from options import add_options, recordings
+from recording import Recording
 
 
 def main() -> int:
     options = parse(sys.argv[1:])
     load_before = os.getloadavg()
-    periods = azimuth_periods(options.azimuth_time)
     results = page.Results()
-    for folder in options.recording + marked(options.data, "*track*"):
-        recording = Recording.open(folder, periods.get(folder.resolve().name))
+    for recording in recordings(options):
         compare(recording, options, results)
     about = page.circumstances("python3 " + shlex.join(sys.argv), load_before)
     write(results, about, options)
@@ -39,32 +37,8 @@ def main() -> int:
 def parse(arguments: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--covsplat", type=Path, help="the binary; without it no maps are judged")
-    parser.add_argument("--recording", type=Path, action="append", default=[], metavar="DIR")
-    parser.add_argument(
-        "--data", type=Path, metavar="DIR", help="also what its INDEX.md marks *track*"
-    )
-    parser.add_argument(
-        "--only",
-        type=re.compile,
-        default=re.compile(""),
-        metavar="REGEX",
-        help="run only what it is found in, as in 'courtyard, KISS-SLAM' or 'college, map, TSDF'",
-    )
-    parser.add_argument("--no-map", action="append", default=[], metavar="NAME", help="recording")
-    parser.add_argument("--voxel", type=float, default=0.1, metavar="METRES", help="of all meshes")
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=Path("bench_out"))
     parser.add_argument("--json", type=Path, metavar="FILE", help="default: OUT/peers.json")
-    parser.add_argument(
-        "--update", type=Path, metavar="PAGE", help="write between its markers, and plots beside it"
-    )
-    parser.add_argument(
-        "--azimuth-time",
-        action="append",
-        default=[],
-        metavar="NAME=SECONDS",
-        help="recording whose points' times follow from the azimuth of a clockwise turn so long",
-    )
+    add_options(parser, out="bench_out", mark="*track*")
     return parser.parse_args(arguments)
 
 

@@ -82,6 +82,11 @@ def rms(errors: Array) -> float:
     return float(np.sqrt(np.mean(errors**2)))
 
 
+def ate_m(estimate: Trajectory, recording: Recording) -> float:
+    absolute_m, _ = errors_of(estimate, recording)
+    return rms(absolute_m)
+
+
 def errors_of(estimate: Trajectory, recording: Recording) -> tuple[Array, Array]:
     """Absolute and relative, at equal times: the exact truth is taken at the estimate's.
 

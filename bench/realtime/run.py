@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import re
 import sys
 from dataclasses import dataclass
 from functools import partial
@@ -23,9 +22,11 @@ import page
 import peers
 import report
 import track_runs
-from covsplat_run import base_command, mesh_of_run, score_mesh, track_times
+from covsplat_run import base_command, track_times
+from map_runs import strict_f_percent
+from options import add_options, recordings
 from processes import apart, run_program
-from recording import Recording, azimuth_periods, marked
+from recording import Recording
 from report import number
 from se3 import Trajectory
 
@@ -70,10 +71,8 @@ class Row:
 def main() -> int:
     options = parse()
     load_before = os.getloadavg()
-    periods = azimuth_periods(options.azimuth_time)
     rows = []
-    for folder in options.recording + marked(options.data, "*track*"):
-        recording = Recording.open(folder, periods.get(folder.resolve().name))
+    for recording in recordings(options):
         for run, measure in runs_of(recording, options).items():
             if not options.only.search(f"{recording.name}, {run}"):
                 continue
@@ -89,15 +88,7 @@ def main() -> int:
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--covsplat", type=Path, required=True, help="the binary")
-    parser.add_argument("--recording", type=Path, action="append", default=[], metavar="DIR")
-    parser.add_argument("--data", type=Path, metavar="DIR", help="also what it marks *track*")
-    parser.add_argument("--azimuth-time", action="append", default=[], metavar="NAME=SECONDS")
-    parser.add_argument("--only", type=re.compile, default=re.compile(""), metavar="REGEX")
-    parser.add_argument("--voxel", type=float, default=0.1, metavar="METRES", help="of all meshes")
-    parser.add_argument("--no-map", action="append", default=[], metavar="NAME", help="recording")
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=Path("bench_out/realtime"))
-    parser.add_argument("--update", type=Path, metavar="PAGE", help="write between its markers")
+    add_options(parser, out="bench_out/realtime", mark="*track*")
     return parser.parse_args()
 
 
@@ -123,12 +114,12 @@ def covsplat(recording: Recording, name: str, options: argparse.Namespace) -> Ro
     return Row(
         recording.name,
         name,
-        ate_m(Trajectory.read_tum(out / "trajectory_tum.txt"), recording),
+        track_runs.ate_m(Trajectory.read_tum(out / "trajectory_tum.txt"), recording),
         track_times(out),
         metrics["time"]["scans_per_s"],
         metrics["memory"]["peak_rss_bytes"] / 2**20,
         metrics,
-        surface(recording, out, options),
+        strict_f_percent(recording, out, options),
     )
 
 
@@ -137,30 +128,11 @@ def peer(recording: Recording, name: str, track: partial) -> Row:
     return Row(
         recording.name,
         name,
-        ate_m(outcome.trajectory, recording),
+        track_runs.ate_m(outcome.trajectory, recording),
         list(outcome.wall_ms),
         1e3 / float(np.mean(outcome.wall_ms)),
         outcome.peak_mib,
     )
-
-
-def ate_m(trajectory: Trajectory, recording: Recording) -> float:
-    absolute_m, _ = track_runs.errors_of(trajectory, recording)
-    return track_runs.rms(absolute_m)
-
-
-def surface(
-    recording: Recording, run: Path, options: argparse.Namespace
-) -> tuple[float, float] | None:
-    if recording.true_mesh is None or recording.name in options.no_map:
-        return None
-    mesh = run / "mesh.ply"
-    mesh_of_run(options.covsplat, run, mesh, options.voxel, options.threads)
-    trajectory = run / "trajectory_tum.txt"
-    score = score_mesh(
-        options.covsplat, mesh, recording, (0.1, 0.05), options.threads, trajectory
-    )
-    return score.strict.f_percent[0.1], score.strict.f_percent[0.05]
 
 
 def cells(row: Row) -> list[str]:

@@ -49,12 +49,17 @@ PoseTable::PoseTable(const ScanMotion& motion, const Eigen::Matrix3d& rotation) 
 std::vector<Eigen::Vector3f> Deskew(std::span<const Eigen::Vector3f> points,
                                     std::span<const float> phase,
                                     const ScanMotion& motion) {
+  return Deskew(points, phase, PoseTable(motion, Eigen::Matrix3d::Identity()));
+}
+
+std::vector<Eigen::Vector3f> Deskew(std::span<const Eigen::Vector3f> points,
+                                    std::span<const float> phase,
+                                    const PoseTable& poses_mid) {
   COVSPLAT_CHECK(phase.empty() || phase.size() == points.size());
   std::vector<Eigen::Vector3f> deskewed(points.begin(), points.end());
   if (phase.empty()) return deskewed;
-  const PoseTable poses(motion, Eigen::Matrix3d::Identity());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    deskewed[i] = poses.Move(phase[i], points[i]).head<3>();
+    deskewed[i] = poses_mid.Move(phase[i], points[i]).head<3>();
   }
   return deskewed;
 }

@@ -109,5 +109,9 @@ class PoseTable {
 std::vector<Eigen::Vector3f> Deskew(std::span<const Eigen::Vector3f> points,
                                     std::span<const float> phase,
                                     const ScanMotion& motion);
+/// The same by a table of the motion, which serves several sets of points.
+std::vector<Eigen::Vector3f> Deskew(std::span<const Eigen::Vector3f> points,
+                                    std::span<const float> phase,
+                                    const PoseTable& poses_mid);
 
 }  // namespace covsplat

@@ -11,14 +11,16 @@
 
 namespace covsplat {
 
+/// Coordinates of cells are within this, either way.
+inline constexpr float kCellLimit = 1048575.0f;
+
 /// Integer coordinates of the cell that holds a position measured in cells. Far positions and NaN
 /// are clamped, so any input is safe.
 inline Eigen::Vector3i CellOf(const Eigen::Vector3f& position) {
-  constexpr float kLimit = 1048575.0f;
   Eigen::Vector3i cell;
   for (int axis = 0; axis < 3; ++axis) {
     const float x = position[axis];
-    const float clamped = x > -kLimit ? (x < kLimit ? x : kLimit) : -kLimit;
+    const float clamped = x > -kCellLimit ? (x < kCellLimit ? x : kCellLimit) : -kCellLimit;
     const int truncated = static_cast<int>(clamped);  // std::floor is a call without SSE4.1
     cell[axis] = truncated - (clamped < static_cast<float>(truncated) ? 1 : 0);
   }

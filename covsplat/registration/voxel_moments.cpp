@@ -75,9 +75,8 @@ HWY_INLINE float SumXyz(Four v) {
 
 // Of the cell of a position in cells. Far positions and NaN are clamped, as by CellOf.
 HWY_INLINE Four FloorWithinLimits(Four position) {
-  constexpr float kLimit = 1048575.0f;
-  const Four above = hn::Max(position, hn::Set(kFour, -kLimit));
-  return hn::Floor(hn::Min(above, hn::Set(kFour, kLimit)));
+  const Four above = hn::Max(position, hn::Set(kFour, -kCellLimit));
+  return hn::Floor(hn::Min(above, hn::Set(kFour, kCellLimit)));
 }
 
 HWY_INLINE Eigen::Vector3i CellAt(Four floor) {

@@ -243,20 +243,18 @@ TrackedScan Tracker::Deskewed(const Scan& scan,
   tracked.scan = scan.index;
   tracked.stamp_s = prepared.timing.mid_stamp_s;
   tracked.T_odom_sensor = motion.T_map_sensor;
-  tracked.points = Deskew(scan.points, prepared.timing.phase, motion);
+  const bool taken_at_once = prepared.timing.phase.empty();
+  const PoseTable poses(taken_at_once ? ScanMotion{} : motion, Eigen::Matrix3d::Identity());
+  tracked.points = Deskew(scan.points, prepared.timing.phase, poses);
   tracked.intensity = scan.intensity;
-  tracked.surface = Deskew(prepared.source.points, prepared.source.phase, motion);
+  tracked.surface = Deskew(prepared.source.points, prepared.source.phase, poses);
   tracked.covariance = prepared.source.covariance;
-  if (prepared.timing.phase.empty()) {
-    tracked.squared_distance = std::move(squared_distance);
-    return tracked;
-  }
-  const PoseTable poses(motion, Eigen::Matrix3d::Identity());
+  tracked.squared_distance = std::move(squared_distance);
+  if (taken_at_once) return tracked;
   for (std::size_t i = 0; i < tracked.covariance.size(); ++i) {
     Eigen::Matrix3f& axes = tracked.covariance[i].axes;
     axes = poses.At(prepared.source.phase[i]).rotation * axes;
   }
-  tracked.squared_distance = std::move(squared_distance);
   return tracked;
 }
 

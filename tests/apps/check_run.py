@@ -19,8 +19,8 @@ from cases import LIMIT_S, binary, case, expect, run_cases
 
 SCANS = 12
 SMALL = ["-s", "lidar.rows=32", "-s", "lidar.columns=256"]
-FILES = ["config.yaml", "frames.csv", "keyframes.csv", "keyframes_tum.txt", "map.ply", "metrics.json", "report.html",
-         "trajectory_kitti.txt", "trajectory_tum.txt"]
+FILES = ["config.yaml", "frames.csv", "keyframes.csv", "keyframes_tum.txt", "map.ply",
+         "metrics.json", "report.html", "trajectory_kitti.txt", "trajectory_tum.txt"]
 
 
 class Bench:
