@@ -22,7 +22,7 @@ GicpConfig RigidGicp(double gate_m, const LoopCheckConfig& config) {
   gicp.motion_model = MotionModel::kRigid;
   gicp.max_correspondence_m = gate_m;
   gicp.inlier_distance_m = config.inlier_distance_m;
-  gicp.degeneracy_ratio = 0.05;
+  gicp.degeneracy_ratio = config.degeneracy_ratio;
   gicp.hold_ratio = 0.01;
   gicp.max_iterations = 30;
   return gicp;
@@ -84,10 +84,11 @@ Matrix6d InformationOf(const AlignResult& align, const LoopCheckConfig& config) 
   return 0.5 * (information + information.transpose());
 }
 
-LoopFate FateOf(const LoopCheck& check, const LoopCheckConfig& config) {
+LoopFate FateOf(const LoopCheck& check, const WeakDirections& weak, const LoopCheckConfig& config) {
   if (check.overlap < config.min_overlap) return LoopFate::kLittleOverlap;
   if (check.rms_m > config.max_rms_m) return LoopFate::kPoorFit;
   if (check.seen_through > config.max_seen_through) return LoopFate::kSeenThrough;
+  if (!weak.translations.empty()) return LoopFate::kDegenerate;
   return LoopFate::kAlone;
 }
 
@@ -110,7 +111,7 @@ LoopCheck CheckLoop(const LocalMap& fresh,
   check.rms_m = align.rms_residual_m;
   check.seen_through = std::max(SeenThroughShare(fresh, old, check.T_old_new),
                                 SeenThroughShare(old, fresh, check.T_old_new.Inverse()));
-  check.fate = FateOf(check, config);
+  check.fate = FateOf(check, align.weak, config);
   return check;
 }
 

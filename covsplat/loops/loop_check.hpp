@@ -14,6 +14,7 @@ struct LoopCheckConfig {
   double min_overlap = 0.5;
   double max_rms_m = 0.1;
   double max_seen_through = 0.22;
+  double degeneracy_ratio = 0.05;
   double sigma_m = 0.02;
   double sigma_deg = 0.1;
 
@@ -42,6 +43,11 @@ struct LoopCheckConfig {
         c.max_seen_through,
         Range{0.0, 1.0},
         "... and no more than this share of either where the other one saw that there is nothing");
+    v.Field("degeneracy_ratio",
+            c.degeneracy_ratio,
+            Range{0.0, 1.0},
+            "... and surfaces that hold it along every direction with at least this share of the "
+            "information that surfaces facing every way would give");
     v.Field("sigma_m",
             c.sigma_m,
             Range{0.0, 10.0},
@@ -57,18 +63,20 @@ enum class LoopFate {
   kLittleOverlap,  ///< too little of the one lies on the other
   kPoorFit,        ///< what overlaps does not fit
   kSeenThrough,    ///< the one saw nothing where the other has surfaces
+  kDegenerate,     ///< every other place along some direction would fit as well
   kTooFar,         ///< the drift cannot be as large as that
   kUndone,         ///< it was in the pose graph, which disagreed
 };
 
 template <>
 struct EnumNames<LoopFate> {
-  static constexpr std::array<EnumName<LoopFate>, 7> kNames{
+  static constexpr std::array<EnumName<LoopFate>, 8> kNames{
       {{LoopFate::kAccepted, "accepted"},
        {LoopFate::kAlone, "alone"},
        {LoopFate::kLittleOverlap, "little overlap"},
        {LoopFate::kPoorFit, "poor fit"},
        {LoopFate::kSeenThrough, "seen through"},
+       {LoopFate::kDegenerate, "degenerate"},
        {LoopFate::kTooFar, "too far"},
        {LoopFate::kUndone, "undone"}}};
 };

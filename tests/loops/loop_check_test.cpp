@@ -112,12 +112,13 @@ TEST_F(LoopCheckTest, AnotherCornerThatLooksAlikeIsNoLoop) {
   EXPECT_GT(check.seen_through, 0.22);
 }
 
-TEST_F(LoopCheckTest, AlongACorridorNothingIsKnown) {
+TEST_F(LoopCheckTest, AlongACorridorNothingIsKnownAndAnyPlaceWouldDo) {
   const RayScene corridor = Corridor();
   const Place old = PlaceAt(corridor, 0, SE3(), 1, pool_);
   const Place fresh = PlaceAt(corridor, 1, SE3(), 2, pool_);
   const LoopCheck check = CheckLoop(
       {{&fresh, SE3()}}, {{&old, SE3()}}, MakePose(0.0, 0.0, 0.01, 0.4, 0.2, 0.0), 1.0, {}, pool_);
+  EXPECT_EQ(check.fate, LoopFate::kDegenerate);
   EXPECT_LT(std::abs(check.T_old_new.Translation().y()), 0.02);
   EXPECT_GT(check.information(4, 4), 1000.0);
   EXPECT_LT(check.information(3, 3), 1.0);
