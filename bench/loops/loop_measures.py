@@ -20,6 +20,12 @@ NEAR_M = 10.0
 LEVEL_M = 1.0
 LONG_BEFORE_M = 30.0
 SHORTEST_M = 5.0
+# Surfaces of two passes that are to be one: of Gaussians that are this near to each other, face the
+# same way and can be seen, within the disc that is drawn of one.
+REACH_M = 0.4
+SAME_WALL_DEG = 20.0
+MIN_OPACITY = 0.5
+DISC_SIGMAS = 3.0
 
 
 @dataclass(frozen=True)
@@ -106,39 +112,67 @@ def any_near(positions: Array, way_m: Array, k: int) -> bool:
 
 
 def thickness_m(run: Path) -> Array:
-    """Distances between surfaces that two passes have left of the same wall."""
-    reach_m, max_angle_deg, min_opacity = 0.4, 20.0, 0.5
-    positions, normals, keyframe, opacity = read_surfels(run / "map.ply")
+    """Distances between surfaces that two passes have left of the same wall: of each Gaussian to
+    the disc of another pass that it lies over. Beyond a disc its plane tells nothing: there it
+    meets another surface."""
+    surfels, keyframe = read_surfels(run / "map.ply")
     passes_m = ways_along(Trajectory.read_tum(run / "keyframes_tum.txt").positions)[keyframe]
-    kept = (opacity > min_opacity) & np.isfinite(positions).all(1)
-    positions, normals, passes_m = positions[kept], normals[kept], passes_m[kept]
+    return passes_apart_m(surfels, passes_m)
+
+
+def passes_apart_m(surfels: Surfels, passes_m: Array) -> Array:
+    """`passes_m`: on the way of the sensor, where each Gaussian was seen first."""
+    kept = (surfels.opacity > MIN_OPACITY) & np.isfinite(surfels.positions).all(1)
+    surfels, passes_m = surfels.at(kept), passes_m[kept]
+    normals = surfels.axes[:, :, 2]
+    tree = cKDTree(surfels.positions)
     found = []
-    for i, near in enumerate(cKDTree(positions).query_ball_point(positions, reach_m)):
+    for i, near in enumerate(tree.query_ball_point(surfels.positions, REACH_M)):
         others = np.array(near)
         others = others[np.abs(passes_m[others] - passes_m[i]) > LONG_BEFORE_M]
-        others = others[normals[others] @ normals[i] > np.cos(np.radians(max_angle_deg))]
+        others = others[normals[others] @ normals[i] > np.cos(np.radians(SAME_WALL_DEG))]
         if not len(others):
             continue
-        apart = positions[others] - positions[i]
-        nearest = np.linalg.norm(apart, axis=1).argmin()
-        found.append(abs(normals[others[nearest]] @ apart[nearest]))
+        apart = surfels.positions[i] - surfels.positions[others]
+        in_disc = np.einsum("nij,ni->nj", surfels.axes[others], apart)
+        sigmas = np.hypot(*(in_disc[:, :2] / surfels.sigma_m[others]).T)
+        over = sigmas.argmin()
+        if sigmas[over] <= DISC_SIGMAS:
+            found.append(abs(in_disc[over, 2]))
     return np.array(found)
 
 
-def read_surfels(ply: Path) -> tuple[Array, Array, Array, Array]:
+@dataclass(frozen=True)
+class Surfels:
+    positions: Array
+    axes: Array  # columns: both directions of the disc, normal
+    sigma_m: Array  # of both directions
+    opacity: Array
+
+    def at(self, kept: Array) -> Surfels:
+        return Surfels(
+            self.positions[kept], self.axes[kept], self.sigma_m[kept], self.opacity[kept]
+        )
+
+
+def read_surfels(ply: Path) -> tuple[Surfels, Array]:
+    """With the keyframe of each."""
     raw = ply.read_bytes()
     end = raw.index(b"end_header\n") + len(b"end_header\n")
     words = [line.split() for line in raw[:end].decode().splitlines()]
     names = [line[2] for line in words if line[0] == "property"]
     count = next(int(line[2]) for line in words if line[:2] == ["element", "vertex"])
     table = np.frombuffer(raw[end:], dtype=[(name, "<f4") for name in names], count=count)
-    quaternions = np.stack([table[f"rot_{k}"] for k in range(4)], 1).astype(float)
+
+    def columns(*names: str) -> Array:
+        return np.stack([table[name] for name in names], 1).astype(float)
+
+    quaternions = columns("rot_0", "rot_1", "rot_2", "rot_3")
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-    positions = np.stack([table[axis] for axis in "xyz"], 1).astype(float)
-    opacity = 1 / (1 + np.exp(-table["opacity"].astype(float)))
-    return (
-        positions,
-        rotations_of(quaternions)[:, :, 2],
-        table["keyframe"].astype(int),
-        opacity,
+    surfels = Surfels(
+        columns("x", "y", "z"),
+        rotations_of(quaternions),
+        np.exp(columns("scale_0", "scale_1")),
+        1 / (1 + np.exp(-table["opacity"].astype(float))),
     )
+    return surfels, table["keyframe"].astype(int)

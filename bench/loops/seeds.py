@@ -21,7 +21,16 @@ from loop_measures import LoopFacts, loop_facts
 from processes import run_program
 from recording import Recording
 
-HEADER = ("world", "seeds", "looked at", "accepted", "wrong", "worst mm", "revisits found", "ATE mm")
+HEADER = (
+    "world",
+    "seeds",
+    "looked at",
+    "accepted",
+    "wrong",
+    "worst mm",
+    "revisits found",
+    "ATE mm",
+)
 
 
 @dataclass(frozen=True)
