@@ -16,8 +16,13 @@ help:  ## List the targets
 setup:  ## Install the Debian packages that are missing
 	@tools/setup.sh
 
+# CUDA=1 builds the CUDA backend as well, with the compiler that PyPI ships.
+CUDA ?=
+CUDA_FLAGS = $(if $(CUDA),$$(tools/setup_cuda.sh))
+
 build-%:
-	@cmake --preset $* >/dev/null
+	@$(if $(CUDA),tools/setup.sh --with-python)
+	@cmake --preset $* $(CUDA_FLAGS) >/dev/null
 	@cmake --build --preset $*
 
 demo: setup  ## Simulate a recording, run the SLAM on it, write demo_out/report.html
@@ -28,9 +33,10 @@ demo: setup  ## Simulate a recording, run the SLAM on it, write demo_out/report.
 test: setup build-dev  ## Build with warnings as errors and run every test
 	ctest --preset dev
 
+cuda: CUDA = 1
 cuda: setup  ## Build with the CUDA backend into build/cuda
 	@tools/setup.sh --with-python
-	@cmake --preset release -B build/cuda $$(tools/setup_cuda.sh) >/dev/null
+	@cmake --preset release -B build/cuda $(CUDA_FLAGS) >/dev/null
 	cmake --build build/cuda
 
 bench: setup build-release  ## Run the benchmarks

@@ -29,13 +29,18 @@ std::string NumberedName(std::int64_t index, const char* extension) {
   return fmt::format("{:06}{}", index, extension);
 }
 
-// Removes what this class wrote and does not open anew; its scans are numbered without a gap.
+// Removes what this class wrote and does not open anew. Its scans are numbered without a gap, and
+// so are those that are left when this is interrupted.
 void RemoveOldRecording(const fs::path& folder) {
   std::error_code ignored;
   for (const char* name : kSingleFiles) fs::remove(folder / name, ignored);
-  for (const auto& [name, extension] : kNumberedFiles) {
-    std::int64_t index = 0;
-    while (fs::remove(folder / name / NumberedName(index, extension), ignored)) ++index;
+  for (const NumberedFiles& files : kNumberedFiles) {
+    const auto file = [&](std::int64_t index) {
+      return folder / files.folder / NumberedName(index, files.extension);
+    };
+    std::int64_t count = 0;
+    while (fs::exists(file(count), ignored)) ++count;
+    while (count > 0 && fs::remove(file(count - 1), ignored)) --count;
   }
 }
 
@@ -130,7 +135,7 @@ Result<void> RecordingWriter::WriteColumn(Column& column,
   };
   // Scans without points that came before any with points have no values either.
   for (std::int64_t i = first_with_points ? 0 : index; i < index; ++i) {
-    const Result<void> none = WriteBinary(path(i), "");
+    Result<void> none = WriteBinary(path(i), "");
     if (!none) return none;
   }
   return WriteBinary(path(index), bytes);
@@ -145,7 +150,7 @@ Result<void> RecordingWriter::WriteSensor(std::string_view yaml) {
 }
 
 Result<void> RecordingWriter::Finish(const Trajectory& dense_truth) {
-  const Result<void> truth = WriteTum(folder_ / "gt_tum.txt", dense_truth);
+  Result<void> truth = WriteTum(folder_ / "gt_tum.txt", dense_truth);
   if (!truth) return truth;
   return times_.Close().and_then([&] { return poses_.Close(); });
 }

@@ -125,6 +125,20 @@ TEST(RecordingWriter, OverwritingReplacesALongerRecordingButNothingElse) {
   EXPECT_EQ(folder.Get("holiday.jpg"), "dear");
 }
 
+TEST(RecordingWriter, OverwritingThatWasInterruptedCanBeDoneAgain) {
+  const TemporaryFolder folder;
+  WriteRecording(folder.Path(), {MakeScan(0.0, 1), MakeScan(0.1, 2), MakeScan(0.2, 3)});
+  // A folder that is not empty stops the removal half way.
+  const std::filesystem::path second = folder.Path() / "velodyne/000001.bin";
+  std::filesystem::remove(second);
+  folder.Put("velodyne/000001.bin/obstacle", "");
+  ASSERT_FALSE(RecordingWriter::Create(folder.Path(), true));
+  EXPECT_TRUE(std::filesystem::exists(folder.Path() / "velodyne/000000.bin"));
+  std::filesystem::remove_all(second);
+  WriteRecording(folder.Path(), {MakeScan(5.0, 4)});
+  EXPECT_EQ(ReadAll(folder.Path()).size(), 1u);
+}
+
 TEST(RecordingWriter, ScansOfSomeoneElseAreNeverOverwritten) {
   const TemporaryFolder folder;
   folder.Put("velodyne/000000.bin", "precious");

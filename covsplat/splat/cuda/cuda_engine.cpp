@@ -55,7 +55,7 @@ CudaEngine::~CudaEngine() { cudaStreamSynchronize(stream_); }
 void CudaEngine::UploadGeometry() {
   const ViewGeometry<float>& g = geometry_;
   std::vector<float> all;
-  const auto add = [&](const std::vector<float>& table) {
+  const auto add = [&](std::span<const float> table) {
     const std::size_t offset = all.size();
     all.insert(all.end(), table.begin(), table.end());
     return offset;
