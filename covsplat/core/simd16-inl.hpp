@@ -155,6 +155,17 @@ HWY_INLINE Pack<S, kCount> MulAdd(const Pack<S, kCount>& a,
   return r;
 }
 
+/// a * b - c.
+template <class S, std::size_t kCount>
+HWY_INLINE Pack<S, kCount> MulSub(const Pack<S, kCount>& a,
+                                  const Pack<S, kCount>& b,
+                                  const Pack<S, kCount>& c) {
+  Pack<S, kCount> r;
+  for (std::size_t i = 0; i < kCount * kParts<S>; ++i)
+    r.part[i] = hn::MulSub(a.part[i], b.part[i], c.part[i]);
+  return r;
+}
+
 /// c - a * b.
 template <class S, std::size_t kCount>
 HWY_INLINE Pack<S, kCount> NegMulAdd(const Pack<S, kCount>& a,
@@ -233,16 +244,19 @@ HWY_INLINE Pack<S, kCount> Exp2Bounded(const Pack<S, kCount>& a) {
   for (std::size_t i = 0; i < kCount * kParts<S>; ++i) {
     if constexpr (sizeof(S) == 4) {
       const hn::RebindToSigned<Tag<S>> di;
-      const auto whole = hn::Round(a.part[i]);
-      const auto f = hn::Sub(a.part[i], whole);
-      // Minimax for the relative error on [-1/2, 1/2], but exact at 0.
-      auto p = hn::Set(d, S(1.3276472e-3));
-      p = hn::MulAdd(p, f, hn::Set(d, S(9.6755413e-3)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(5.5507133e-2)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(2.4022120e-1)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(6.9314697e-1)));
-      p = hn::MulAdd(p, f, hn::Set(d, S(1)));
-      const auto exponent = hn::ShiftLeft<23>(hn::ConvertTo(di, whole));
+      // Added to this number, which leaves no bits for fractions, a becomes a whole number, in
+      // two's complement in the lowest bits: faster than to round and to convert.
+      const auto shift = hn::Set(d, S(12582912));  // 1.5 * 2^23
+      const auto shifted = hn::Add(a.part[i], shift);
+      const auto f = hn::Sub(a.part[i], hn::Sub(shifted, shift));
+      // Minimax for the relative error on [-1/2, 1/2], but exact at 0; pairs of terms, which do not
+      // wait for each other as those of Horner's scheme do.
+      const auto ff = hn::Mul(f, f);
+      const auto p01 = hn::MulAdd(f, hn::Set(d, S(6.9314697e-1)), hn::Set(d, S(1)));
+      const auto p23 = hn::MulAdd(f, hn::Set(d, S(5.5507133e-2)), hn::Set(d, S(2.4022120e-1)));
+      const auto p45 = hn::MulAdd(f, hn::Set(d, S(1.3276472e-3)), hn::Set(d, S(9.6755413e-3)));
+      const auto p = hn::MulAdd(hn::MulAdd(p45, ff, p23), ff, p01);
+      const auto exponent = hn::ShiftLeft<23>(hn::BitCast(di, shifted));
       r.part[i] = hn::BitCast(d, hn::Add(hn::BitCast(di, p), exponent));
     } else {
       r.part[i] = hn::Exp(d, hn::Mul(a.part[i], hn::Set(d, S(0.69314718055994530942))));

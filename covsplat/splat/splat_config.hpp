@@ -8,9 +8,9 @@ namespace covsplat {
 /// How Gaussians become images (algorithm: rays against flat Gaussians, front to back).
 struct RasterConfig {
   double near_m = 0.1;
-  double alpha_min = 1.0 / 255.0;
+  double alpha_min = 0.02;
   double alpha_cap = 0.99;
-  double transmittance_min = 1e-4;
+  double transmittance_min = 0.03;
   double lowpass = 2.0;
   double grazing_cosine = 0.02;
   bool two_sided = false;

@@ -21,24 +21,49 @@ namespace {
 /// the screen-space filter was met instead of the surface.
 template <class S>
 struct KeptSurfels {
-  AlignedVector<S> alpha;  ///< [16 x kept]
-  AlignedVector<S> range;  ///< [16 x kept]
-  std::vector<TilePair> pair;
-
-  void MakeRoom(std::size_t count) {
-    if (pair.size() >= count) return;
-    alpha.resize(2 * 16 * count);
-    range.resize(2 * 16 * count);
-    pair.resize(2 * count);
-  }
+  S* alpha;  ///< [16 x kept]
+  S* range;  ///< [16 x kept]
+  TilePair* pair;
 };
 
-/// One for each thread, so that tiles do not allocate.
+/// Memory for them; one for each thread, so that tiles do not allocate.
 template <class S>
-KeptSurfels<S>& Scratch() {
-  thread_local KeptSurfels<S> kept;
-  return kept;
-}
+class KeptMemory {
+ public:
+  static KeptMemory& OfThisThread() {
+    thread_local KeptMemory memory;
+    return memory;
+  }
+
+  KeptSurfels<S> RoomFor(std::size_t count) {
+    if (pair_.size() < count) {
+      alpha_.resize(2 * 16 * count);
+      range_.resize(2 * 16 * count);
+      pair_.resize(2 * count);
+    }
+    return {alpha_.data(), range_.data(), pair_.data()};
+  }
+
+ private:
+  AlignedVector<S> alpha_;
+  AlignedVector<S> range_;
+  std::vector<TilePair> pair_;
+};
+
+/// Constants of the inner loops, by value: for all the compiler knows, what these write might
+/// change those of the view.
+template <class S>
+struct RayLimits {
+  explicit RayLimits(const ViewGeometry<S>& view)
+      : near_m(view.near_m),
+        alpha_min(view.alpha_min),
+        alpha_cap(view.alpha_cap),
+        transmittance_min(view.transmittance_min),
+        lowpass(view.lowpass),
+        grazing_cosine(view.grazing_cosine) {}
+
+  S near_m, alpha_min, alpha_cap, transmittance_min, lowpass, grazing_cosine;
+};
 
 }  // namespace
 }  // namespace covsplat
@@ -169,7 +194,7 @@ struct Meeting {
 
 /// The nearer of surface and screen-space filter in standard deviations (algorithm 7.5).
 template <class S, std::size_t kCount>
-HWY_INLINE Meeting<S, kCount> Meet(const ViewGeometry<S>& view,
+HWY_INLINE Meeting<S, kCount> Meet(const RayLimits<S>& limits,
                                    const TileRays<S>& rays,
                                    const SurfelRecord<S>* const (&surfels)[kCount]) {
   constexpr S kHalfLog2E = S(0.72134752044448170368);
@@ -185,24 +210,24 @@ HWY_INLINE Meeting<S, kCount> Meet(const ViewGeometry<S>& view,
   };
   using Record = const SurfelRecord<S>&;
   const Pack<S, kCount> n_ray = dot_ray([](Record s) { return s.n; });
-  const auto steep = n_ray < all(-view.grazing_cosine);  // what t is positive for faces the ray
+  const auto steep = n_ray < all(-limits.grazing_cosine);  // what t is positive for faces the ray
   const Pack<S, kCount> t = each([](Record s) { return s.plane; }) * Reciprocal(n_ray);
   const Pack<S, kCount> a =
-      MulAdd(t, dot_ray([](Record s) { return s.u; }), each([](Record s) { return -s.u_c; }));
+      MulSub(t, dot_ray([](Record s) { return s.u; }), each([](Record s) { return s.u_c; }));
   const Pack<S, kCount> b =
-      MulAdd(t, dot_ray([](Record s) { return s.v; }), each([](Record s) { return -s.v_c; }));
+      MulSub(t, dot_ray([](Record s) { return s.v; }), each([](Record s) { return s.v_c; }));
   const Pack<S, kCount> dx =
       each([&](Record s) { return LocalColumn(s, rays); }) - Repeat<kCount>(rays.column);
   const Pack<S, kCount> dy =
       each([&](Record s) { return s.row - rays.corner_row; }) - Repeat<kCount>(rays.row);
   const Pack<S, kCount> surface = MulAdd(a, a, b * b);
-  const Pack<S, kCount> filter = all(view.lowpass) * MulAdd(dx, dx, dy * dy);
-  const auto on_surface = steep & (t > all(view.near_m)) & (surface <= filter);
+  const Pack<S, kCount> filter = all(limits.lowpass) * MulAdd(dx, dx, dy * dy);
+  const auto on_surface = steep & (t > all(limits.near_m)) & (surface <= filter);
   const Pack<S, kCount> distance = Select(on_surface, surface, filter);
   const Pack<S, kCount> exponent = Max(all(-kHalfLog2E) * distance, all(S(-115)));
   const Pack<S, kCount> opacity = each([](Record s) { return s.opacity; });
   const Pack<S, kCount> range = each([](Record s) { return s.range; });
-  return {Min(opacity * Exp2Bounded(exponent), all(view.alpha_cap)),
+  return {Min(opacity * Exp2Bounded(exponent), all(limits.alpha_cap)),
           Select(on_surface, t, range),
           Select(on_surface, t, -range)};
 }
@@ -210,14 +235,14 @@ HWY_INLINE Meeting<S, kCount> Meet(const ViewGeometry<S>& view,
 /// Blends one Gaussian into the tile as number `count` of the kept ones; `met` are its values of a
 /// Meeting. Returns which pixels see it.
 template <Pass kPass, class S>
-HWY_INLINE PackMask<S> BlendSurfel(const ViewGeometry<S>& view,
+HWY_INLINE PackMask<S> BlendSurfel(const RayLimits<S>& limits,
                                    const PixelRanges<S>& ranges,
                                    const SurfelRecord<S>& s,
                                    const Meeting<S, 1>& met,
                                    std::size_t count,
                                    Blend<S>& blend,
-                                   KeptSurfels<S>& kept) {
-  const auto seen = (met.alpha >= All(view.alpha_min)) & blend.open;
+                                   const KeptSurfels<S>& kept) {
+  const auto seen = (met.alpha >= All(limits.alpha_min)) & blend.open;
   const Pack<S> alpha = SelectOrZero(seen, met.alpha);
   const Pack<S> weight = alpha * blend.transmittance;
   blend.normal = MulAdd(weight, Broadcast(s.n), blend.normal);
@@ -236,7 +261,7 @@ HWY_INLINE PackMask<S> BlendSurfel(const ViewGeometry<S>& view,
     StorePack(met.signed_range, &kept.range[16 * count]);
   }
   blend.transmittance = blend.transmittance - weight;
-  blend.open = blend.transmittance > All(view.transmittance_min);
+  blend.open = blend.transmittance > All(limits.transmittance_min);
   return seen;
 }
 
@@ -247,22 +272,23 @@ HWY_INLINE std::size_t BlendTile(const TileJob<S>& job,
                                  const TileRays<S>& rays,
                                  const PixelRanges<S>& ranges,
                                  Blend<S>& blend,
-                                 KeptSurfels<S>& kept) {
+                                 const KeptSurfels<S>& kept) {
+  const RayLimits<S> limits(*job.view);
+  const SurfelRecord<S>* const records = job.records;
+  TilePair* const pairs = job.bins->pairs.data();
   const std::uint32_t begin = job.bins->tile_begin[tile];
   const std::uint32_t end = job.bins->tile_end[tile];
-  kept.MakeRoom(end - begin + 1);
-  const TilePair* pairs = job.bins->pairs.data();
   std::size_t count = 0;
   for (std::uint32_t k = begin; k < end; k += kTogether<S>) {
     const SurfelRecord<S>* surfels[kTogether<S>];
     for (std::uint32_t i = 0; i < kTogether<S>; ++i) {
-      surfels[i] = &job.records[pairs[std::min(k + i, end - 1)].record];
-      hwy::Prefetch(&job.records[pairs[std::min(k + i + kPrefetchAhead, end - 1)].record]);
+      surfels[i] = &records[pairs[std::min(k + i, end - 1)].record];
+      hwy::Prefetch(&records[pairs[std::min(k + i + kPrefetchAhead, end - 1)].record]);
     }
-    const Meeting<S, kTogether<S>> met = Meet<S>(*job.view, rays, surfels);
+    const Meeting<S, kTogether<S>> met = Meet<S>(limits, rays, surfels);
     for (std::uint32_t i = 0; i < kTogether<S> && k + i < end; ++i) {
       const Meeting<S, 1> one{Nth(met.alpha, i), Nth(met.range, i), Nth(met.signed_range, i)};
-      const auto seen = BlendSurfel<kPass>(*job.view, ranges, *surfels[i], one, count, blend, kept);
+      const auto seen = BlendSurfel<kPass>(limits, ranges, *surfels[i], one, count, blend, kept);
       // What is not seen is overwritten by the next one: cheaper than a branch that is often wrong.
       kept.pair[count] = pairs[k + i];
       count += None(seen) ? 0 : 1;
@@ -270,7 +296,7 @@ HWY_INLINE std::size_t BlendTile(const TileJob<S>& job,
     if (None(blend.open)) break;
   }
   if (job.drop_unseen) {
-    std::copy_n(kept.pair.begin(), count, job.bins->pairs.begin() + begin);
+    std::copy_n(kept.pair, count, pairs + begin);
     job.bins->tile_end[tile] = begin + static_cast<std::uint32_t>(count);
   }
   return count;
@@ -390,7 +416,7 @@ struct RayGradient {
 /// Sums the gradient of one kept Gaussian over the tile's pixels into its slot. `kept_range`: as
 /// in KeptSurfels.
 template <Pass kPass, class S>
-HWY_INLINE void SumSurfelGradient(const ViewGeometry<S>& view,
+HWY_INLINE void SumSurfelGradient(S lowpass,
                                   const TileRays<S>& rays,
                                   const SurfelRecord<S>& s,
                                   const Pack<S>& kept_range,
@@ -431,7 +457,7 @@ HWY_INLINE void SumSurfelGradient(const ViewGeometry<S>& view,
   } else {
     const Pack<S> dx = All(LocalColumn(s, rays)) - rays.column;
     const Pack<S> dy = All(s.row - rays.corner_row) - rays.row;
-    const Pack<S> g_filter = All(-view.lowpass) * Select(on_surface, zero, ray.alpha);
+    const Pack<S> g_filter = All(-lowpass) * Select(on_surface, zero, ray.alpha);
     const Pack<S> filter_terms[4] = {
         g_filter * dx, g_filter * dy, Select(on_surface, zero, ray.range), zero};
     SumEach(filter_terms, slot + kSlotColumn);
@@ -451,15 +477,19 @@ HWY_INLINE void BackTile(const TileJob<S>& job,
   // A loss may leave out what only the screen-space filter shows.
   const bool through_filter =
       kPass != Pass::kLearn && (job.loss == nullptr || job.loss->through_filter);
+  const RayLimits<S> limits(*job.view);
+  const SurfelRecord<S>* const records = job.records;
+  S* const slots = job.slots;
+  SlotState* const slot_state = job.slot_state;
   Pack<S> transmittance = blend.transmittance;
   Pack<S> suffix = zero;
   for (std::size_t i = count; i-- > 0;) {
     const TilePair pair = kept.pair[i];
-    const SurfelRecord<S>& s = job.records[pair.record];
+    const SurfelRecord<S>& s = records[pair.record];
     const Pack<S> alpha = LoadPack(&kept.alpha[16 * i]);
     const Pack<S> kept_range = LoadPack(&kept.range[16 * i]);
     if (i >= kPrefetchAhead) {
-      hwy::Prefetch(&job.slots[16 * static_cast<std::size_t>(kept.pair[i - kPrefetchAhead].slot)]);
+      hwy::Prefetch(&slots[16 * static_cast<std::size_t>(kept.pair[i - kPrefetchAhead].slot)]);
     }
     const Pack<S> inverse = Reciprocal(All(S(1)) - alpha);
     transmittance = transmittance * inverse;
@@ -476,11 +506,11 @@ HWY_INLINE void BackTile(const TileJob<S>& job,
     auto reached = (alpha > zero) & (range < g.hidden_from);
     if (!through_filter) reached = reached & (kept_range > zero);
     if (None(reached)) {
-      job.slot_state[pair.slot] = kSeen;
+      slot_state[pair.slot] = kSeen;
       continue;
     }
-    job.slot_state[pair.slot] = kWritten;
-    const auto below_cap = reached & (alpha < All(job.view->alpha_cap));
+    slot_state[pair.slot] = kWritten;
+    const auto below_cap = reached & (alpha < All(limits.alpha_cap));
     const auto in_cap = reached & (miss < ranges.cap);
     RayGradient<S> ray;
     ray.weight = SelectOrZero(reached, weight);
@@ -490,8 +520,8 @@ HWY_INLINE void BackTile(const TileJob<S>& job,
       const auto is_median = reached & Equal(blend.median_entry, All(static_cast<S>(i)));
       ray.range = ray.range + MulAdd(ray.weight, g.range_sum, SelectOrZero(is_median, g.median));
     }
-    S* slot = job.slots + 16 * static_cast<std::size_t>(pair.slot);
-    SumSurfelGradient<kPass>(*job.view, rays, s, kept_range, ray, g.normal, slot);
+    S* slot = slots + 16 * static_cast<std::size_t>(pair.slot);
+    SumSurfelGradient<kPass>(limits.lowpass, rays, s, kept_range, ray, g.normal, slot);
   }
 }
 
@@ -508,10 +538,12 @@ HWY_INLINE PixelRanges<S> RangesOf(const TileJob<S>& job, std::size_t tile) {
 
 template <class S>
 HWY_INLINE void RenderAll(const TileJob<S>& job, std::size_t begin, std::size_t end) {
-  KeptSurfels<S>& kept = Scratch<S>();
+  KeptMemory<S>& memory = KeptMemory<S>::OfThisThread();
   const PixelRanges<S> no_ranges{All(S(0)), All(S(0))};
   for (std::size_t tile = begin; tile < end; ++tile) {
     Blend<S> blend = EmptyBlend<S>();
+    const KeptSurfels<S> kept =
+        memory.RoomFor(job.bins->tile_end[tile] - job.bins->tile_begin[tile] + 1);
     BlendTile<Pass::kRender>(job, tile, RaysOf(*job.view, tile), no_ranges, blend, kept);
     StoreTile(blend, tile, *job.images);
   }
@@ -519,13 +551,15 @@ HWY_INLINE void RenderAll(const TileJob<S>& job, std::size_t begin, std::size_t 
 
 template <Pass kPass, class S>
 HWY_INLINE LossSums StepAll(const TileJob<S>& job, std::size_t begin, std::size_t end) {
-  KeptSurfels<S>& kept = Scratch<S>();
+  KeptMemory<S>& memory = KeptMemory<S>::OfThisThread();
   LossSums sums;
   for (std::size_t tile = begin; tile < end; ++tile) {
     if (job.upstream == nullptr && !AnyTarget(*job.targets, tile)) continue;
     const TileRays<S> rays = RaysOf(*job.view, tile);
     const PixelRanges<S> ranges = RangesOf(job, tile);
     Blend<S> blend = EmptyBlend<S>();
+    const KeptSurfels<S> kept =
+        memory.RoomFor(job.bins->tile_end[tile] - job.bins->tile_begin[tile] + 1);
     const std::size_t count = BlendTile<kPass>(job, tile, rays, ranges, blend, kept);
     if constexpr (kPass == Pass::kAll) StoreTile(blend, tile, *job.images);
     ImageGradient<S> gradient = NoGradient<S>();
