@@ -39,10 +39,9 @@ cuda: setup  ## Build with the CUDA backend into build/cuda
 	@cmake --preset release -B build/cuda $(CUDA_FLAGS) >/dev/null
 	cmake --build build/cuda
 
-bench: setup build-release  ## Run the benchmarks
-	@for b in build/release/bench/*_bench; do \
-	  if [ -x "$$b" ]; then echo "$$b" && "$$b" || exit 1; fi; \
-	done
+bench: setup build-release .venv/peers  ## Time the kernels, beside the roofline: docs/benchmarks.md
+	COVSPLAT_DATA=$(COVSPLAT_DATA) PYTHONPATH=bench/peers .venv/bin/python bench/kernels/run.py \
+	  --build build/release/bench --out bench_out/kernels --update docs/benchmarks.md
 
 bench-instructions: setup build-release  ## Fail if a hot kernel takes more instructions than recorded
 	@tools/setup.sh --with-dev

@@ -3,15 +3,15 @@
 // and, where the recording is at hand, optimising a street.
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <optional>
+#include <string>
 
+#include "bench/hall.hpp"
+#include "bench/machine_peak.hpp"
 #include "bench/recorded_street.hpp"
 #include <benchmark/benchmark.h>
 
-#include "covsplat/core/rng.hpp"
 #include "covsplat/splat/compact_view.hpp"
 #include "covsplat/splat/cpu/rasterizer.hpp"
 #include "covsplat/splat/cuda/device_info.hpp"
@@ -21,96 +21,26 @@
 namespace covsplat {
 namespace {
 
-constexpr int kStepsPerView = 10;  // as a run makes them, which is once per binning
-constexpr int kAnchors = 4;
-const Eigen::Vector3d kHalfHall(15.0, 10.0, 3.0);
-
-const SensorModel& Sensor() {
-  static const SensorModel sensor = UniformSensorModel(64, 1024, -0.39, 0.39, 0.5, 60.0);
-  return sensor;
-}
-
-SE3 AnchorPose(int anchor) {
-  return {Eigen::Quaterniond::Identity(), Eigen::Vector3d(2.0 * anchor - 3.0, 0.5 * anchor, 0.0)};
-}
-
-/// What the sensor measures in the hall from an anchor.
-RangeMeasurement Measure(int anchor) {
-  const Eigen::Vector3d from = AnchorPose(anchor).Translation();
-  const int rows = Sensor().Rows();
-  const int columns = Sensor().Columns();
-  RangeMeasurement m{Image<float>(rows, columns, 0.0f),
-                     Image<Eigen::Vector3f>(rows, columns, Eigen::Vector3f::Zero())};
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      const Eigen::Vector3d ray = Sensor().RayOf(row, column).cast<double>();
-      double nearest = 1e9;
-      for (int axis = 0; axis < 3; ++axis) {
-        const double side = ray[axis] < 0.0 ? -1.0 : 1.0;
-        const double t = (side * kHalfHall[axis] - from[axis]) / (ray[axis] + side * 1e-9);
-        if (t >= nearest) continue;
-        nearest = t;
-        m.normal(row, column) = static_cast<float>(-side) * Eigen::Vector3f::Unit(axis);
-      }
-      m.range_m(row, column) = static_cast<float>(nearest);
-    }
-  }
-  return m;
-}
-
-/// Surfels spread evenly over the hall's six sides, a little off, in the map's frame.
-GaussianColumns<float> Cover(std::size_t count) {
-  const Eigen::Vector3d side = 2.0 * kHalfHall;
-  const Eigen::Vector3d area(side.y() * side.z(), side.x() * side.z(), side.x() * side.y());
-  const double scale = 0.6 * std::sqrt(2.0 * area.sum() / static_cast<double>(count));
-  const auto log_scale = Eigen::Vector2f::Constant(static_cast<float>(std::log(scale)));
-  GaussianColumns<float> table;
-  table.Resize(count);
-  Rng rng(1);
-  for (std::size_t i = 0; i < count; ++i) {
-    const double pick = rng.Uniform() * area.sum();
-    const int axis = pick < area.x() ? 0 : pick < area.x() + area.y() ? 1 : 2;
-    const double sign = rng.Uniform() < 0.5 ? -1.0 : 1.0;
-    Eigen::Vector3d mean;
-    for (int k = 0; k < 3; ++k) mean[k] = kHalfHall[k] * rng.Uniform(-1.0, 1.0);
-    mean[axis] = sign * kHalfHall[axis] + 0.02 * rng.Normal();
-    const Eigen::Vector3d tilt(rng.Normal(), rng.Normal(), rng.Normal());
-    const Eigen::Vector3d normal = (0.1 * tilt - sign * Eigen::Vector3d::Unit(axis)).normalized();
-    const auto q = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), normal);
-    WriteGaussian(table, i, mean.cast<float>(), q.cast<float>(), log_scale, 1.5f);
-  }
-  return table;
-}
-
-std::unique_ptr<SplatEngine> MakeHall(Backend backend, std::size_t count, ThreadPool& pool) {
-  auto engine = MakeSplatEngine(backend, Sensor(), {}, pool).value();
-  const int map = engine->AddAnchor(SE3());
-  engine->Append(map, Cover(count));
-  for (int anchor = 0; anchor < kAnchors; ++anchor) {
-    engine->SetView(engine->AddAnchor(AnchorPose(anchor)), Measure(anchor));
-  }
-  return engine;
-}
+constexpr int kRows = 64;
 
 void BM_Render(benchmark::State& state, Backend backend) {
   ThreadPool pool(0);
-  const auto engine = MakeHall(backend, static_cast<std::size_t>(state.range(0)), pool);
-  int anchor = 0;
+  const auto gaussians = static_cast<std::size_t>(state.range(0));
+  const auto engine = MakeHall(backend, HallSensor(kRows), gaussians, pool);
+  int view = 0;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(engine->Render(AnchorPose(anchor++ % kAnchors)).alpha.Size());
+    benchmark::DoNotOptimize(engine->Render(HallPose(view++)).alpha.Size());
   }
 }
 
 /// Forward, loss, backward and Adam, with all that comes between.
 void BM_Step(benchmark::State& state, Backend backend) {
   ThreadPool pool(0);
-  const auto engine = MakeHall(backend, static_cast<std::size_t>(state.range(0)), pool);
+  const auto gaussians = static_cast<std::size_t>(state.range(0));
+  const auto engine = MakeHall(backend, HallSensor(kRows), gaussians, pool);
   int visit = 0;
   StepReport report;
-  for (auto _ : state) {
-    const int anchor = 1 + visit++ % kAnchors;
-    for (int i = 0; i < kStepsPerView; ++i) report = engine->Step(anchor, true);
-  }
+  for (auto _ : state) report = VisitHall(*engine, visit++);
   benchmark::DoNotOptimize(engine->Gaussians().Size());  // all work is done
   const double steps = static_cast<double>(kStepsPerView) * visit;
   state.counters["steps/s"] = benchmark::Counter(steps, benchmark::Counter::kIsRate);
@@ -160,8 +90,52 @@ void BM_StreetStep(benchmark::State& state, const RecordedStreet& street, Backen
   state.counters["pairs/surfel"] = pairs / static_cast<double>(surfels.Size());
 }
 
+/// Arithmetic and memory traffic of a stage, for its roofline. Counted in the source: a
+/// multiply-add is two operations, a reciprocal or an exponential what it is made of; what is
+/// written counts once.
+struct Work {
+  double flops;
+  double bytes;
+};
+
+Work ProjectionOf(std::size_t gaussians) {
+  constexpr double kFlops = 240.0;
+  constexpr double kBytes = kParameterCount * sizeof(float) + sizeof(SurfelRecord<float>);
+  return {kFlops * static_cast<double>(gaussians), kBytes * static_cast<double>(gaussians)};
+}
+
+/// Forward, loss and backward.
+Work TilesOf(const Rasterizer<float>& rasterizer) {
+  constexpr double kFlopsPerPixelAndPair = 66.0 + 63.0;  // there and back
+  constexpr double kSlotBytes = 16 * sizeof(float);
+  constexpr double kBytesPerPair = sizeof(TilePair) + sizeof(SurfelRecord<float>) + kSlotBytes;
+  constexpr double kBytesPerPixel = 7 * sizeof(float);  // range, two normals
+  const auto pairs = static_cast<double>(rasterizer.Slots());
+  const auto pixels = static_cast<double>(kTilePixels * rasterizer.View().Tiles());
+  return {kFlopsPerPixelAndPair * kTilePixels * pairs,
+          kBytesPerPair * pairs + kBytesPerPixel * pixels};
+}
+
+Work OptimizationOf(std::size_t gaussians, std::size_t slots) {
+  constexpr double kFlops = 270.0;
+  constexpr double kFlopsPerSlot = 16.0;
+  constexpr double kSlotBytes = 16 * sizeof(float);
+  constexpr double kBytes = sizeof(SurfelRecord<float>) +
+                            2.0 * (int{kParameterCount} + int{kMomentCount}) * sizeof(float);
+  const auto n = static_cast<double>(gaussians);
+  const auto s = static_cast<double>(slots);
+  return {kFlops * n + kFlopsPerSlot * s, kBytes * n + kSlotBytes * s};
+}
+
+/// Adds what a stage takes at the roof, ms.
+void CountRoof(benchmark::State& state, const char* stage, const MachinePeak& peak, Work work) {
+  state.counters[std::string(stage) + "_roof"] =
+      1e3 * RooflineSeconds(peak, work.flops, work.bytes);
+}
+
 /// The stages of such a step on the CPU: milliseconds per view for what is done once for each, per
-/// step for the rest; the least of all iterations.
+/// step for the rest; the least of all iterations. Beside those of a step what the machine's
+/// roofline leaves of them.
 void BM_StreetStages(benchmark::State& state, const RecordedStreet& street) {
   ThreadPool pool(static_cast<int>(state.range(0)));
   const auto surfels =
@@ -198,6 +172,13 @@ void BM_StreetStages(benchmark::State& state, const RecordedStreet& street) {
            [&] { rasterizer.Optimize(gaussians, moments, config.loss, config.optimizer); });
     }
   }
+  const MachinePeak peak = MeasurePeak(pool);
+  state.counters["peak_GFLOP/s"] = 1e-9 * peak.flops_per_s;
+  state.counters["peak_GB/s"] = 1e-9 * peak.bytes_per_s;
+  state.counters["pairs"] = static_cast<double>(rasterizer.Slots());
+  CountRoof(state, "project", peak, ProjectionOf(surfels.Size()));
+  CountRoof(state, "tiles", peak, TilesOf(rasterizer));
+  CountRoof(state, "optimize", peak, OptimizationOf(surfels.Size(), rasterizer.Slots()));
 }
 
 void RegisterStreet(const RecordedStreet& street) {

@@ -87,9 +87,10 @@ class Aligner {
   static constexpr double kMaxDamping = 1e3;
   static constexpr std::size_t kEnoughForCoarse = 4000;
   static constexpr std::size_t kCoarseStride = 4;
-  // Points whose match changes to and fro keep steps from becoming small: so many steps that get
-  // nowhere are the end.
-  static constexpr std::size_t kCycle = 4;
+  // Points whose matches change in turns keep steps from becoming small. To be where so many steps
+  // began is the end, too.
+  static constexpr std::size_t kShortestCycle = 3;
+  static constexpr std::size_t kLongestCycle = 12;
 
   // Gauss-Newton with every `stride`-th point until steps are small (epsilons times `tolerance`).
   PhaseMoments Iterate(std::size_t stride, double tolerance) {
@@ -117,14 +118,23 @@ class Aligner {
       moments = next;
       accepted_median = median_;
       damping_ *= 0.1;
-      recent.push_back(candidate);
-      if (recent.size() > kCycle) recent.pop_front();
-      const bool circles =
-          recent.size() == kCycle && IsSmall(Between(recent.front(), candidate), tolerance);
-      result_.converged = widening_ == 1.0 && (circles || IsSmall(step, tolerance));
+      result_.converged =
+          widening_ == 1.0 && (IsSmall(step, tolerance) || WasHere(recent, candidate, tolerance));
+      recent.push_front(candidate);
+      if (recent.size() > kLongestCycle) recent.pop_back();
       if (result_.converged) break;
     }
     return moments;
+  }
+
+  /// `recent`: the newest first.
+  bool WasHere(const std::deque<ScanMotion>& recent,
+               const ScanMotion& motion,
+               double tolerance) const {
+    for (std::size_t k = kShortestCycle - 1; k < recent.size(); ++k) {
+      if (IsSmall(Between(recent[k], motion), tolerance)) return true;
+    }
+    return false;
   }
 
   PhaseMoments Evaluate(const ScanMotion& motion, std::size_t stride) {

@@ -47,6 +47,8 @@ class Rasterizer {
   const TileImages<S>& Images() const { return images_; }
   /// (Gaussian, tile) pairs of the current bins: the size of the work.
   std::size_t Pairs() const { return binner_.Bins().pairs.size(); }
+  /// Those of them that some pixel saw when the last gradient was made after binning.
+  std::size_t Slots() const { return slot_state_.size(); }
   std::size_t ActiveBlocks() const { return active_.size(); }
 
  private:

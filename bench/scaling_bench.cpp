@@ -1,0 +1,92 @@
+// How time grows with the work: beams of the sensor, Gaussians in view, and threads.
+#include <algorithm>
+#include <thread>
+
+#include "bench/hall.hpp"
+#include "tests/support/registration_fixtures.hpp"
+#include <benchmark/benchmark.h>
+
+namespace covsplat::test {
+namespace {
+
+constexpr std::int64_t kBeams = 64;
+constexpr std::int64_t kGaussians = 100'000;
+
+/// A step of the optimiser on an image of 1024 columns, with all that comes between.
+void BM_StepByWork(benchmark::State& state) {
+  ThreadPool pool(static_cast<int>(state.range(0)));
+  const SensorModel sensor = HallSensor(static_cast<int>(state.range(1)));
+  const auto engine =
+      MakeHall(Backend::kCpu, sensor, static_cast<std::size_t>(state.range(2)), pool);
+  int visit = 0;
+  for (auto _ : state) VisitHall(*engine, visit++);
+  const double steps = static_cast<double>(kStepsPerView) * visit;
+  state.counters["steps/s"] = benchmark::Counter(steps, benchmark::Counter::kIsRate);
+}
+
+/// Preparation of a scan of 1024 columns and its registration to the surfels of six others.
+void BM_TrackByWork(benchmark::State& state) {
+  constexpr double kNoise = 0.02;
+  constexpr double kStamp = 1.0;
+  ThreadPool pool(static_cast<int>(state.range(0)));
+  const SensorModel sensor = HallSensor(static_cast<int>(state.range(1)));
+  std::vector<TargetSurfel> surfels;
+  for (int k = 0; k < 6; ++k) {
+    const SE3 pose = HandheldWalk(3.0 * k);
+    const Motion still = [&](double) -> SE3 { return pose; };
+    Scan scan = Simulate(Room(), sensor, still, 0.0, kNoise, static_cast<std::uint64_t>(k));
+    scan.time_offset_s.clear();
+    AppendSurfels(PreprocessStill(scan, pool), pose, surfels);
+  }
+  const RegistrationTarget target(surfels, Eigen::Vector3d::Zero(), 1);
+  const Scan scan = Simulate(Room(), sensor, HandheldWalk, kStamp, kNoise);
+  const ScanTiming timing = TimeScan(scan, DeskewConfig{});
+  MotionPrediction prediction;
+  prediction.motion.twist =
+      (HandheldWalk(kStamp - kScanPeriod).Inverse() * HandheldWalk(kStamp)).Log();
+  prediction.motion.T_map_sensor = HandheldWalk(kStamp) * MakePose(0.01, 0.01, 0.02, 0.05, 0, 0);
+  prediction.horizon_s = 0.3;
+  PreprocessConfig config;
+  config.downsample_voxel_m = 0.3;
+  int iterations = 0;
+  for (auto _ : state) {
+    const SourceCloud source = Preprocess(scan, timing, prediction.motion, config, pool);
+    iterations = Align(source, target, prediction, GicpConfig{}, pool).iterations;
+  }
+  state.counters["iterations"] = iterations;
+  state.counters["points"] = static_cast<double>(scan.points.size());
+}
+
+/// One curve after the other: the rest stays at the middle of its own curve.
+void Register() {
+  const auto processors =
+      static_cast<std::int64_t>(std::max(1u, std::thread::hardware_concurrency()));
+  const std::int64_t all = std::min<std::int64_t>(processors, 16);
+  auto* step = benchmark::RegisterBenchmark("BM_StepByWork", BM_StepByWork);
+  step->ArgNames({"threads", "beams", "gaussians"});
+  auto* track = benchmark::RegisterBenchmark("BM_TrackByWork", BM_TrackByWork);
+  track->ArgNames({"threads", "beams"});
+  for (const std::int64_t beams : {16, 32, 64, 128}) {
+    step->Args({all, beams, kGaussians});
+    track->Args({all, beams});
+  }
+  for (const std::int64_t gaussians : {10'000, 30'000, 300'000, 1'000'000, 2'000'000}) {
+    step->Args({all, kBeams, gaussians});
+  }
+  for (std::int64_t threads = 1; threads < all; threads *= 2) {
+    step->Args({threads, kBeams, kGaussians});
+    track->Args({threads, kBeams});
+  }
+  for (auto* bench : {step, track}) bench->UseRealTime()->Unit(benchmark::kMillisecond);
+}
+
+}  // namespace
+}  // namespace covsplat::test
+
+int main(int argc, char** argv) {
+  covsplat::test::Register();
+  benchmark::Initialize(&argc, argv);
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+  return 0;
+}
