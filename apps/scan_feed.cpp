@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <deque>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -71,9 +72,12 @@ class RealtimeFeed : public ScanFeed {
       thread_ = std::jthread([this](const std::stop_token& token) { Deliver(token); });
     }
     std::unique_lock lock(mutex_);
-    if (waiting_) ++late_;
-    while (!waiting_ && !ended_ && !stop_()) news_.wait_for(lock, kPatience);
-    return std::exchange(waiting_, std::nullopt);
+    if (!waiting_.empty()) ++late_;
+    while (waiting_.empty() && !ended_ && !stop_()) news_.wait_for(lock, kPatience);
+    if (waiting_.empty()) return std::nullopt;
+    FedScan oldest = std::move(waiting_.front());
+    waiting_.pop_front();
+    return oldest;
   }
 
   FeedCounts Counts() override {
@@ -117,8 +121,11 @@ class RealtimeFeed : public ScanFeed {
   void Put(FedScan scan) {
     const std::scoped_lock lock(mutex_);
     TakeOver();
-    if (waiting_) ++dropped_;
-    waiting_ = std::move(scan);
+    if (waiting_.size() == kMaxWaitingScans) {
+      waiting_.pop_front();
+      ++dropped_;
+    }
+    waiting_.push_back(std::move(scan));
     news_.notify_one();
   }
 
@@ -132,7 +139,7 @@ class RealtimeFeed : public ScanFeed {
   std::mutex mutex_;
   std::condition_variable news_;
   // All guarded by mutex_.
-  std::optional<FedScan> waiting_;
+  std::deque<FedScan> waiting_;  ///< the oldest first
   bool ended_ = false;
   std::int64_t late_ = 0;
   std::int64_t dropped_ = 0;

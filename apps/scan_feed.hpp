@@ -17,7 +17,7 @@ struct FeedCounts {
   std::int64_t damaged = 0;    ///< could not be read
   std::int64_t backwards = 0;  ///< not later than the scan before
   std::int64_t late = 0;       ///< came while the tracker was busy, and waited for it
-  std::int64_t dropped = 0;    ///< waited and were overtaken by the next
+  std::int64_t dropped = 0;    ///< waited and were overtaken by newer ones
 };
 
 struct FeedProblem {
@@ -48,8 +48,12 @@ std::unique_ptr<ScanFeed> MakeFeed(std::unique_ptr<ScanSource> source,
                                    std::int64_t jump,
                                    std::function<bool()> stop);
 
-/// The scans of another feed at the times of their stamps, from the first call on. One scan waits;
-/// a newer one takes its place.
+/// So many scans wait to be taken in real time: one delay costs none, and who is always too slow is
+/// not far behind.
+inline constexpr std::size_t kMaxWaitingScans = 2;
+
+/// The scans of another feed at the times of their stamps, from the first call on. The newest
+/// kMaxWaitingScans wait; older ones are dropped.
 std::unique_ptr<ScanFeed> MakeRealtimeFeed(std::unique_ptr<ScanFeed> feed,
                                            std::function<bool()> stop);
 

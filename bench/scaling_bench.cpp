@@ -33,7 +33,7 @@ void BM_TrackByWork(benchmark::State& state) {
   std::vector<TargetSurfel> surfels;
   for (int k = 0; k < 6; ++k) {
     const SE3 pose = HandheldWalk(3.0 * k);
-    const Motion still = [&](double) -> SE3 { return pose; };
+    const auto still = [k](double /*stamp_s*/) { return HandheldWalk(3.0 * k); };
     Scan scan = Simulate(Room(), sensor, still, 0.0, kNoise, static_cast<std::uint64_t>(k));
     scan.time_offset_s.clear();
     AppendSurfels(PreprocessStill(scan, pool), pose, surfels);

@@ -15,7 +15,8 @@ constexpr double kNothing = 1e-12;
 }  // namespace
 
 BlockMatrix::BlockMatrix(int blocks, std::span<const std::pair<int, int>> pattern)
-    : matrix_(kBlock * blocks, kBlock * blocks), rows_(static_cast<std::size_t>(blocks)) {
+    : matrix_(Eigen::Index{kBlock} * blocks, Eigen::Index{kBlock} * blocks),
+      rows_(static_cast<std::size_t>(blocks)) {
   for (std::size_t column = 0; column < rows_.size(); ++column) {
     rows_[column].push_back(static_cast<int>(column));
   }

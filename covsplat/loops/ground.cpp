@@ -42,6 +42,7 @@ SE3 AlignWithGround(std::span<const Eigen::Vector3f> points) {
   SE3 T_ground_local;
   if (lowest.empty()) return T_ground_local;
   std::vector<double> heights;
+  heights.reserve(lowest.size());
   for (const Eigen::Vector3d& p : lowest) heights.push_back(p.z());
   std::ranges::nth_element(heights,
                            heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2));

@@ -78,7 +78,7 @@ class Solver {
 
   void Linearize() {
     hessian_.SetZero();
-    gradient_ = Eigen::VectorXd::Zero(6 * Variables(graph_));
+    gradient_ = Eigen::VectorXd::Zero(Eigen::Index{6} * Variables(graph_));
     for (const PoseEdge& edge : graph_.edges) AddEdge(edge);
   }
 
@@ -109,7 +109,7 @@ class Solver {
     if (node == 0) return;
     const Matrix6d weighted = by_node.transpose() * information;
     hessian_.Add(node - 1, node - 1, weighted * by_node);
-    gradient_.segment<6>(6 * (node - 1)) += weighted * error;
+    gradient_.segment<6>(Eigen::Index{6} * (node - 1)) += weighted * error;
   }
 
   const SE3& Pose(int node) const { return solution_.T_map_node[static_cast<std::size_t>(node)]; }
@@ -146,7 +146,7 @@ class Solver {
     std::vector<SE3> moved = solution_.T_map_node;
     for (int v = 0; v < Variables(graph_); ++v) {
       SE3& pose = moved[static_cast<std::size_t>(v) + 1];
-      pose = pose * SE3::Exp(step.segment<6>(6 * v));
+      pose = pose * SE3::Exp(step.segment<6>(Eigen::Index{6} * v));
     }
     return moved;
   }

@@ -47,10 +47,9 @@ struct ViewGeometry {
 /// Where a pixel is in the tile-by-tile arrays below.
 template <class S>
 std::size_t PixelIndex(const ViewGeometry<S>& view, int row, int column) {
-  const auto tile =
-      static_cast<std::size_t>((row / kTileSide) * view.tile_columns + column / kTileSide);
-  const auto lane = static_cast<std::size_t>((row % kTileSide) * kTileSide + column % kTileSide);
-  return kTilePixels * tile + lane;
+  const int tile = (row / kTileSide) * view.tile_columns + column / kTileSide;
+  const int lane = (row % kTileSide) * kTileSide + column % kTileSide;
+  return kTilePixels * static_cast<std::size_t>(tile) + static_cast<std::size_t>(lane);
 }
 
 /// Which Gaussians touch which tile, front to back.
