@@ -14,7 +14,7 @@ struct LoopCheckConfig {
   double min_overlap = 0.5;
   double max_rms_m = 0.1;
   double max_seen_through = 0.22;
-  double degeneracy_ratio = 0.05;
+  double degeneracy_ratio = 0.01;
   double sigma_m = 0.02;
   double sigma_deg = 0.1;
 
