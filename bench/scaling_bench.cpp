@@ -3,7 +3,7 @@
 #include <thread>
 
 #include "bench/hall.hpp"
-#include "tests/support/registration_fixtures.hpp"
+#include "bench/walk.hpp"
 #include <benchmark/benchmark.h>
 
 namespace covsplat::test {
@@ -26,31 +26,15 @@ void BM_StepByWork(benchmark::State& state) {
 
 /// Preparation of a scan of 1024 columns and its registration to the surfels of six others.
 void BM_TrackByWork(benchmark::State& state) {
-  constexpr double kNoise = 0.02;
-  constexpr double kStamp = 1.0;
   ThreadPool pool(static_cast<int>(state.range(0)));
   const SensorModel sensor = HallSensor(static_cast<int>(state.range(1)));
-  std::vector<TargetSurfel> surfels;
-  for (int k = 0; k < 6; ++k) {
-    const SE3 pose = HandheldWalk(3.0 * k);
-    const auto still = [k](double /*stamp_s*/) { return HandheldWalk(3.0 * k); };
-    Scan scan = Simulate(Room(), sensor, still, 0.0, kNoise, static_cast<std::uint64_t>(k));
-    scan.time_offset_s.clear();
-    AppendSurfels(PreprocessStill(scan, pool), pose, surfels);
-  }
-  const RegistrationTarget target(surfels, Eigen::Vector3d::Zero(), 1);
-  const Scan scan = Simulate(Room(), sensor, HandheldWalk, kStamp, kNoise);
+  const RegistrationTarget target(RoomSurfels(sensor, pool), Eigen::Vector3d::Zero(), 1);
+  const Scan scan = WalkScan(sensor);
   const ScanTiming timing = TimeScan(scan, DeskewConfig{});
-  MotionPrediction prediction;
-  prediction.motion.twist =
-      (HandheldWalk(kStamp - kScanPeriod).Inverse() * HandheldWalk(kStamp)).Log();
-  prediction.motion.T_map_sensor = HandheldWalk(kStamp) * MakePose(0.01, 0.01, 0.02, 0.05, 0, 0);
-  prediction.horizon_s = 0.3;
-  PreprocessConfig config;
-  config.downsample_voxel_m = 0.3;
+  const MotionPrediction prediction = WalkPrediction();
   int iterations = 0;
   for (auto _ : state) {
-    const SourceCloud source = Preprocess(scan, timing, prediction.motion, config, pool);
+    const SourceCloud source = Preprocess(scan, timing, prediction.motion, Fine(), pool);
     iterations = Align(source, target, prediction, GicpConfig{}, pool).iterations;
   }
   state.counters["iterations"] = iterations;

@@ -88,7 +88,7 @@ def tables(found: list[Benchmark]) -> list[str]:
 def stage_table(stages: dict[int, dict[str, float]]) -> str:
     header = ["stage", "of a step"]
     for threads in stages:
-        header += [f"ms, {threads} threads", "% of the roofline"]
+        header += [f"ms, {of(threads)}", "% of the roofline"]
     rows = []
     for stage, (what, once) in STAGES.items():
         row = [what, f"1 in {STEPS_PER_VIEW}" if once else "every"]
@@ -101,7 +101,7 @@ def stage_table(stages: dict[int, dict[str, float]]) -> str:
 
 def peak_line(stages: dict[int, dict[str, float]]) -> str:
     peaks = ", ".join(
-        f"{v['peak_GFLOP/s']:.0f} GFLOP/s and {v['peak_GB/s']:.1f} GB/s with {threads} threads"
+        f"{v['peak_GFLOP/s']:.0f} GFLOP/s and {v['peak_GB/s']:.1f} GB/s with {of(threads)}"
         for threads, v in stages.items()
     )
     pairs = next(iter(stages.values()))["pairs"]
@@ -116,7 +116,7 @@ def street_table(streets: list[tuple[re.Match[str], float]]) -> str:
         [str(surfels), str(footprint), *(number(times[n, surfels, footprint], 2) for n in threads)]
         for surfels, footprint in work
     ]
-    header = ["surfels", "footprint factor", *(f"ms per step, {n} threads" for n in threads)]
+    header = ["surfels", "footprint factor", *(f"ms per step, {of(n)}" for n in threads)]
     return report.table(header, rows) + "\n"
 
 
@@ -128,6 +128,10 @@ def curve_table(curves: list[tuple[re.Match[str], Benchmark]]) -> str:
         what = "optimiser step" if is_step else "preparation and registration"
         rows.append([what, match[3], match[4] or "-", match[2], number(ms, 2)])
     return report.table(["work", "beams", "Gaussians", "threads", "ms"], rows) + "\n"
+
+
+def of(threads: int) -> str:
+    return "1 thread" if threads == 1 else f"{threads} threads"
 
 
 def work_of(match: re.Match[str]) -> tuple[str, int, int, int]:

@@ -144,39 +144,20 @@ HWY_INLINE void StoreMasked(const PackMask<S>& mask, const Pack<S>& a, S* HWY_RE
   }
 }
 
-/// a * b + c.
-template <class S, std::size_t kCount>
-HWY_INLINE Pack<S, kCount> MulAdd(const Pack<S, kCount>& a,
-                                  const Pack<S, kCount>& b,
-                                  const Pack<S, kCount>& c) {
-  Pack<S, kCount> r;
-  for (std::size_t i = 0; i < kCount * kParts<S>; ++i)
-    r.part[i] = hn::MulAdd(a.part[i], b.part[i], c.part[i]);
-  return r;
-}
-
-/// a * b - c.
-template <class S, std::size_t kCount>
-HWY_INLINE Pack<S, kCount> MulSub(const Pack<S, kCount>& a,
-                                  const Pack<S, kCount>& b,
-                                  const Pack<S, kCount>& c) {
-  Pack<S, kCount> r;
-  for (std::size_t i = 0; i < kCount * kParts<S>; ++i)
-    r.part[i] = hn::MulSub(a.part[i], b.part[i], c.part[i]);
-  return r;
-}
-
-/// c - a * b.
-template <class S, std::size_t kCount>
-HWY_INLINE Pack<S, kCount> NegMulAdd(const Pack<S, kCount>& a,
-                                     const Pack<S, kCount>& b,
-                                     const Pack<S, kCount>& c) {
-  Pack<S, kCount> r;
-  for (std::size_t i = 0; i < kCount * kParts<S>; ++i) {
-    r.part[i] = hn::NegMulAdd(a.part[i], b.part[i], c.part[i]);
+#define COVSPLAT_PACK_TERNARY(NAME)                                                   \
+  template <class S, std::size_t kCount>                                              \
+  HWY_INLINE Pack<S, kCount> NAME(                                                    \
+      const Pack<S, kCount>& a, const Pack<S, kCount>& b, const Pack<S, kCount>& c) { \
+    Pack<S, kCount> r;                                                                \
+    for (std::size_t i = 0; i < kCount * kParts<S>; ++i) {                            \
+      r.part[i] = hn::NAME(a.part[i], b.part[i], c.part[i]);                          \
+    }                                                                                 \
+    return r;                                                                         \
   }
-  return r;
-}
+COVSPLAT_PACK_TERNARY(MulAdd)     // a * b + c
+COVSPLAT_PACK_TERNARY(MulSub)     // a * b - c
+COVSPLAT_PACK_TERNARY(NegMulAdd)  // c - a * b
+#undef COVSPLAT_PACK_TERNARY
 
 template <class S, std::size_t kCount>
 HWY_INLINE PackMask<S, kCount> operator&(const PackMask<S, kCount>& a,

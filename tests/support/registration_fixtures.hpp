@@ -31,10 +31,14 @@ inline SourceCloud PreprocessStill(const Scan& scan, ThreadPool& pool) {
 }
 
 /// A scan from a sensor at rest at `pose`.
-inline SourceCloud StillCloud(
-    const RayScene& scene, const SE3& pose, double noise_m, std::uint64_t seed, ThreadPool& pool) {
+inline SourceCloud StillCloud(const RayScene& scene,
+                              const SE3& pose,
+                              double noise_m,
+                              std::uint64_t seed,
+                              ThreadPool& pool,
+                              const SensorModel& sensor = SimulatedSensor()) {
   const Motion still = [&](double) { return pose; };
-  Scan scan = Simulate(scene, SimulatedSensor(), still, 0.0, noise_m, seed);
+  Scan scan = Simulate(scene, sensor, still, 0.0, noise_m, seed);
   scan.time_offset_s.clear();
   return PreprocessStill(scan, pool);
 }

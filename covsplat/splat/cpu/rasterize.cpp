@@ -35,7 +35,9 @@ class KeptMemory {
     return memory;
   }
 
-  KeptSurfels<S> RoomFor(std::size_t count) {
+  /// For all of a tile's list, and one more that is overwritten.
+  KeptSurfels<S> RoomFor(const TileBins& bins, std::size_t tile) {
+    const std::size_t count = bins.tile_end[tile] - bins.tile_begin[tile] + 1;
     if (pair_.size() < count) {
       alpha_.resize(2 * 16 * count);
       range_.resize(2 * 16 * count);
@@ -542,8 +544,7 @@ HWY_INLINE void RenderAll(const TileJob<S>& job, std::size_t begin, std::size_t 
   const PixelRanges<S> no_ranges{All(S(0)), All(S(0))};
   for (std::size_t tile = begin; tile < end; ++tile) {
     Blend<S> blend = EmptyBlend<S>();
-    const KeptSurfels<S> kept =
-        memory.RoomFor(job.bins->tile_end[tile] - job.bins->tile_begin[tile] + 1);
+    const KeptSurfels<S> kept = memory.RoomFor(*job.bins, tile);
     BlendTile<Pass::kRender>(job, tile, RaysOf(*job.view, tile), no_ranges, blend, kept);
     StoreTile(blend, tile, *job.images);
   }
@@ -558,8 +559,7 @@ HWY_INLINE LossSums StepAll(const TileJob<S>& job, std::size_t begin, std::size_
     const TileRays<S> rays = RaysOf(*job.view, tile);
     const PixelRanges<S> ranges = RangesOf(job, tile);
     Blend<S> blend = EmptyBlend<S>();
-    const KeptSurfels<S> kept =
-        memory.RoomFor(job.bins->tile_end[tile] - job.bins->tile_begin[tile] + 1);
+    const KeptSurfels<S> kept = memory.RoomFor(*job.bins, tile);
     const std::size_t count = BlendTile<kPass>(job, tile, rays, ranges, blend, kept);
     if constexpr (kPass == Pass::kAll) StoreTile(blend, tile, *job.images);
     ImageGradient<S> gradient = NoGradient<S>();
