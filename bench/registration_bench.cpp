@@ -1,5 +1,5 @@
 // What one 64 x 1024 scan of a handheld sensor costs: preparation and registration to a map.
-#include "bench/walk.hpp"
+#include "tests/support/walk.hpp"
 #include <benchmark/benchmark.h>
 
 namespace covsplat::test {

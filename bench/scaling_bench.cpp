@@ -3,7 +3,7 @@
 #include <thread>
 
 #include "bench/hall.hpp"
-#include "bench/walk.hpp"
+#include "tests/support/walk.hpp"
 #include <benchmark/benchmark.h>
 
 namespace covsplat::test {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/support/registration_fixtures.hpp"
+#include "tests/support/walk.hpp"
 #include <gtest/gtest.h>
 
 namespace covsplat::test {
@@ -60,6 +60,23 @@ TEST(Align, FindsTheMotionBetweenNoisyScansToMillimetres) {
   EXPECT_LT(RotationError(result.motion.T_map_sensor, kTruth), 1e-3);
   EXPECT_EQ(result.degenerate_directions, 0);
   EXPECT_GT(result.inlier_ratio, 0.9);
+}
+
+// Of a few scans there are points that change their matches in turns, for ever.
+TEST(Align, EndsWhereStepsGoRoundInCircles) {
+  ThreadPool pool(2);
+  const SensorModel sensor = UniformSensorModel(32, 512, -0.25 * M_PI, 0.25 * M_PI, 0.5, 60.0);
+  const RegistrationTarget target(RoomSurfels(sensor, pool), Eigen::Vector3d::Zero(), 1);
+  for (std::uint64_t k = 0; k < 140; ++k) {
+    const double stamp_s = 1.0 + 0.05 * static_cast<double>(k);
+    const Scan scan = Simulate(Room(), sensor, HandheldWalk, stamp_s, 0.05, 100 + k);
+    const MotionPrediction prediction = WalkPrediction(stamp_s);
+    const SourceCloud source =
+        Preprocess(scan, TimeScan(scan, DeskewConfig{}), prediction.motion, Fine(), pool);
+    const AlignResult result = Align(source, target, prediction, GicpConfig{}, pool);
+    EXPECT_TRUE(result.converged) << k;
+    EXPECT_LT(result.iterations, 40) << k;
+  }
 }
 
 TEST(Align, DoesNotDependOnTheScaleOfTheWeights) {

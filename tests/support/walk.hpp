@@ -1,5 +1,5 @@
-// A scan of somebody walking with a sensor, its prediction, and the surfels of six other scans:
-// what benchmarks of tracking prepare and register.
+// Scans of somebody walking with a sensor, their predictions, and the surfels of six other scans:
+// what is prepared and registered in tests and benchmarks of tracking.
 #pragma once
 
 #include <vector>
@@ -15,12 +15,13 @@ inline Scan WalkScan(const SensorModel& sensor) {
   return Simulate(Room(), sensor, HandheldWalk, kWalkStamp, kWalkNoise);
 }
 
-inline MotionPrediction WalkPrediction() {
-  const SE3 before = HandheldWalk(kWalkStamp - kScanPeriod);
+/// As of a tracker, 5 cm and some hundredths of a radian off.
+inline MotionPrediction WalkPrediction(double mid_stamp_s = kWalkStamp) {
+  const SE3 before = HandheldWalk(mid_stamp_s - kScanPeriod);
   MotionPrediction prediction;
-  prediction.motion.twist = (before.Inverse() * HandheldWalk(kWalkStamp)).Log();
+  prediction.motion.twist = (before.Inverse() * HandheldWalk(mid_stamp_s)).Log();
   prediction.motion.T_map_sensor =
-      HandheldWalk(kWalkStamp) * MakePose(0.01, 0.01, 0.02, 0.05, 0, 0);
+      HandheldWalk(mid_stamp_s) * MakePose(0.01, 0.01, 0.02, 0.05, 0, 0);
   prediction.horizon_s = 0.3;
   return prediction;
 }
