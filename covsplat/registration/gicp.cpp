@@ -10,6 +10,7 @@
 
 #include "covsplat/registration/motion_prior.hpp"
 #include "covsplat/registration/scan_residuals.hpp"
+#include "covsplat/registration/step_stretch.hpp"
 
 namespace covsplat {
 namespace {
@@ -85,6 +86,9 @@ class Aligner {
   static constexpr double kWorse = 1.5;
   static constexpr double kFirstDamping = 1e-2;
   static constexpr double kMaxDamping = 1e3;
+  // Only steps of so many epsilons are stretched: what creeps less, along directions that surfaces
+  // hardly hold, ends nearer to the prediction, and trajectories are the better for it.
+  static constexpr double kStretchFrom = 30.0;
   static constexpr std::size_t kEnoughForCoarse = 4000;
   static constexpr std::size_t kCoarseStride = 4;
   // Points whose matches change in turns keep steps from becoming small. To be where so many steps
@@ -100,26 +104,30 @@ class Aligner {
     double accepted_median = median_;
     damping_ = 0.0;
     result_.converged = false;
+    StepStretch stretch;
     std::deque<ScanMotion> recent;
     while (moments.matches >= kMinMatches && result_.iterations < config_.max_iterations) {
       ++result_.iterations;
       widening_ = std::max(1.0, 0.5 * widening_);
       const Vector18d step = Solve(moments, result_.motion, stride);
       if (!step.allFinite()) break;
-      const ScanMotion candidate = Moved(result_.motion, step);
+      const bool small = IsSmall(step, tolerance);
+      const bool settled = widening_ == 1.0;
+      const double factor = settled && !IsSmall(step, kStretchFrom) ? stretch.Of(step) : 1.0;
+      const ScanMotion candidate = Moved(result_.motion, factor * step);
       const PhaseMoments next = Evaluate(candidate, stride);
       if (next.matches < kMinMatches || median_ > kWorse * accepted_median + kMinKernelScale) {
         median_ = accepted_median;
         damping_ = std::max(10.0 * damping_, kFirstDamping);
         if (damping_ > kMaxDamping) break;
+        stretch.Forget();
         continue;
       }
       result_.motion = candidate;
       moments = next;
       accepted_median = median_;
       damping_ *= 0.1;
-      result_.converged =
-          widening_ == 1.0 && (IsSmall(step, tolerance) || WasHere(recent, candidate, tolerance));
+      result_.converged = settled && (small || WasHere(recent, candidate, tolerance));
       recent.push_front(candidate);
       if (recent.size() > kLongestCycle) recent.pop_back();
       if (result_.converged) break;
@@ -139,7 +147,7 @@ class Aligner {
 
   PhaseMoments Evaluate(const ScanMotion& motion, std::size_t stride) {
     const double scale = KernelScale(median_, widening_ * config_.kernel_width);
-    const PhaseMoments moments = residuals_.Evaluate(motion, scale, stride, pool_);
+    PhaseMoments moments = residuals_.Evaluate(motion, scale, stride, pool_);
     median_ = residuals_.MedianSquare();
     return moments;
   }

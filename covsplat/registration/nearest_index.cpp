@@ -27,39 +27,51 @@ HWY_INLINE Four SquaredDistances(const float* x,
   return hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
 }
 
-// Squared distance between a cell's box and a position, both in cells.
-float SquaredGap(const Eigen::Vector3f& position, int x, int y, int z) {
-  const auto axis_gap = [](float p, int low) {
-    const auto edge = static_cast<float>(low);
-    return std::max({edge - p, p - edge - 1.0f, 0.0f});
-  };
-  const float dx = axis_gap(position.x(), x);
-  const float dy = axis_gap(position.y(), y);
-  const float dz = axis_gap(position.z(), z);
-  return dx * dx + dy * dy + dz * dz;
+// Squared distance between a position and a box, both in edges of the box.
+float SquaredGap(const Eigen::Vector3f& position, const Eigen::Vector3i& low) {
+  const Eigen::Array3f edge = low.cast<float>().array();
+  const Eigen::Array3f beyond = position.array() - edge - 1.0f;
+  return (edge - position.array()).max(beyond).max(0.0f).matrix().squaredNorm();
+}
+
+// The lowest `count` bits.
+std::uint64_t Lowest(int count) {
+  return count >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
 }
 
 }  // namespace
 
 NearestIndex::NearestIndex(std::span<const Eigen::Vector3f> points, float cell_m)
-    : cells_per_m_(1.0f / cell_m), cells_(points.size() / 4) {
+    : cells_per_m_(1.0f / cell_m), block_ids_(points.size() / 64) {
   COVSPLAT_CHECK(cell_m > 0.0f);
   const std::size_t n = points.size();
-  std::vector<int> cell_of(n);
-  begin_.assign(1, 0);  // counts, shifted by one, until they are summed up
+  std::vector<std::pair<int, int>> place(n);  // block and cell in it
   for (std::size_t i = 0; i < n; ++i) {
     const Eigen::Vector3i cell = CellOf(points[i] * cells_per_m_);
-    cell_of[i] = cells_.FindOrInsert(cell, static_cast<int>(begin_.size()) - 1);
-    if (cell_of[i] + 1 == static_cast<int>(begin_.size())) begin_.push_back(0);
-    ++begin_[static_cast<std::size_t>(cell_of[i]) + 1];
+    const int block = block_ids_.FindOrInsert(BlockOf(cell), static_cast<int>(blocks_.size()));
+    if (block == static_cast<int>(blocks_.size())) blocks_.emplace_back();
+    place[i] = {block, CellInBlock(cell)};
+    blocks_[static_cast<std::size_t>(block)].cells |= std::uint64_t{1} << place[i].second;
   }
+  int cells = 0;
+  for (Block& block : blocks_) {
+    block.first = cells;
+    cells += std::popcount(block.cells);
+  }
+  const auto cell_of = [&](std::size_t i) {
+    const Block& block = blocks_[static_cast<std::size_t>(place[i].first)];
+    const int before = std::popcount(block.cells & Lowest(place[i].second));
+    return static_cast<std::size_t>(block.first + before);
+  };
+  begin_.assign(static_cast<std::size_t>(cells) + 1, 0);
+  for (std::size_t i = 0; i < n; ++i) ++begin_[cell_of(i) + 1];
   for (std::size_t c = 1; c < begin_.size(); ++c) begin_[c] += begin_[c - 1];
 
   order_.resize(n);
   for (std::vector<float>* axis : {&x_, &y_, &z_}) axis->resize(n + kLanes - 1);
   std::vector<int> next(begin_.begin(), begin_.end() - 1);
   for (std::size_t i = 0; i < n; ++i) {
-    const auto slot = static_cast<std::size_t>(next[static_cast<std::size_t>(cell_of[i])]++);
+    const auto slot = static_cast<std::size_t>(next[cell_of(i)]++);
     order_[slot] = static_cast<int>(i);
     x_[slot] = points[i].x();
     y_[slot] = points[i].y();
@@ -67,15 +79,39 @@ NearestIndex::NearestIndex(std::span<const Eigen::Vector3f> points, float cell_m
   }
 }
 
+std::uint64_t NearestIndex::CellsWithin(const Box& box, const Eigen::Vector3i& block) {
+  const Eigen::Vector3i origin = kBlockEdge * block;
+  const Eigen::Array3i low = (box.low - origin).array().max(0);
+  const Eigen::Array3i end = (box.high - origin).array().min(kBlockEdge - 1) + 1;
+  const auto between = [](int from, int to) { return Lowest(to) & ~Lowest(from); };
+  return between(16 * low.x(), 16 * end.x()) &
+         0x0001'0001'0001'0001u * between(4 * low.y(), 4 * end.y()) &
+         0x1111'1111'1111'1111u * between(low.z(), end.z());
+}
+
+// How far a point may be to matter, in cells.
+float NearestIndex::Reach(const Search& search) const {
+  constexpr float kSlack = 1.0001f;  // covers rounding
+  return (std::sqrt(search.squared) + search.margin_m) * cells_per_m_ * kSlack;
+}
+
+void NearestIndex::ScanBlock(const Eigen::Vector3i& at, std::uint64_t cells, Search& search) const {
+  const int found = block_ids_.Find(at);
+  if (found < 0) return;
+  const Block& block = blocks_[static_cast<std::size_t>(found)];
+  ForEachCell(block, cells, [&](int bit, int begin, int end) {
+    const Eigen::Vector3i cell = kBlockEdge * at + Eigen::Vector3i(bit >> 4, bit >> 2 & 3, bit & 3);
+    const float reach = Reach(search);
+    if (SquaredGap(search.position, cell) <= reach * reach) ScanSlots(begin, end, search);
+  });
+}
+
 // Four points at a time; few are nearer than what was found before.
-void NearestIndex::ScanCell(const Eigen::Vector3i& cell, Search& search) const {
-  const int position = cells_.Find(cell);
-  if (position < 0) return;
-  const int end = begin_[static_cast<std::size_t>(position) + 1];
-  for (int slot = begin_[static_cast<std::size_t>(position)]; slot < end; slot += kLanes) {
+void NearestIndex::ScanSlots(int begin, int end, Search& search) const {
+  for (int slot = begin; slot < end; slot += kLanes) {
     const auto at = static_cast<std::size_t>(slot);
     const Four squared = SquaredDistances(&x_[at], &y_[at], &z_[at], search.query);
-    const auto nearer = hn::Lt(squared, hn::Set(kFour, search.second_squared));
+    const auto nearer = hn::Le(squared, hn::Set(kFour, search.second_squared));
     if (hn::AllFalse(kFour, nearer)) continue;
     alignas(16) std::array<float, kLanes> lanes;
     hn::Store(squared, kFour, lanes.data());
@@ -85,7 +121,7 @@ void NearestIndex::ScanCell(const Eigen::Vector3i& cell, Search& search) const {
 }
 
 void NearestIndex::Consider(int slot, float squared, Search& search) const {
-  if (!(squared < search.second_squared) || slot == search.slot) return;
+  if (!(squared <= search.second_squared) || slot == search.slot) return;
   const bool tie =
       squared == search.squared && search.slot >= 0 && IndexOf(slot) < IndexOf(search.slot);
   if (squared < search.squared || tie) {
@@ -101,8 +137,10 @@ NearestIndex::Match NearestIndex::Nearest(const Eigen::Vector3f& query,
                                           float max_squared,
                                           int hint,
                                           float margin_m) const {
-  constexpr float kSlack = 1.0001f;  // covers rounding
-  Search search{.query = query, .squared = max_squared};
+  Search search{.query = query,
+                .position = query * cells_per_m_,
+                .margin_m = margin_m,
+                .squared = max_squared};
   if (hint >= 0) {
     const auto at = static_cast<std::size_t>(hint);
     const float squared = hn::GetLane(SquaredDistances(&x_[at], &y_[at], &z_[at], query));
@@ -111,24 +149,21 @@ NearestIndex::Match NearestIndex::Nearest(const Eigen::Vector3f& query,
       search.slot = hint;
     }
   }
-  const Eigen::Vector3f position = query * cells_per_m_;
-  const Eigen::Vector3i home = CellOf(position);
-  ScanCell(home, search);
+  const Eigen::Vector3i home = CellOf(search.position);
+  const Eigen::Vector3i home_block = BlockOf(home);
+  const std::uint64_t home_cell = std::uint64_t{1} << CellInBlock(home);
+  ScanBlock(home_block, home_cell, search);
   // The other cells that the sphere of the best distance so far and the margin reaches.
-  const auto reach = [&] { return (std::sqrt(search.squared) + margin_m) * cells_per_m_ * kSlack; };
-  const float radius = reach();
-  const Eigen::Vector3i low = CellOf((position.array() - radius).matrix());
-  const Eigen::Vector3i high = CellOf((position.array() + radius).matrix());
-  for (int x = low.x(); x <= high.x(); ++x) {
-    for (int y = low.y(); y <= high.y(); ++y) {
-      for (int z = low.z(); z <= high.z(); ++z) {
-        if (x == home.x() && y == home.y() && z == home.z()) continue;
-        const float limit = reach();
-        if (SquaredGap(position, x, y, z) > limit * limit) continue;
-        ScanCell({x, y, z}, search);
-      }
-    }
-  }
+  const float radius = Reach(search);
+  const Box box{CellOf((search.position.array() - radius).matrix()),
+                CellOf((search.position.array() + radius).matrix())};
+  ScanBlock(home_block, CellsWithin(box, home_block) & ~home_cell, search);
+  const Eigen::Vector3f in_blocks = search.position / kBlockEdge;
+  ForEachBlock(box, [&](const Eigen::Vector3i& at) {
+    if (at == home_block) return;
+    const float reach = Reach(search) / kBlockEdge;
+    if (SquaredGap(in_blocks, at) <= reach * reach) ScanBlock(at, CellsWithin(box, at), search);
+  });
   if (search.slot < 0) return {};
   const float distance = std::sqrt(search.squared);
   return {
