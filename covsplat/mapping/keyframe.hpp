@@ -58,6 +58,7 @@ struct KeyframeConfig {
   double max_distance_m = 2.0;
   double max_angle_deg = 20.0;
   double min_overlap = 0.8;
+  double min_support = 0.85;
   double wait_support = 0.85;
   double overlap_distance_m = 0.6;
   int max_scans = 20;
@@ -71,6 +72,11 @@ struct KeyframeConfig {
             c.min_overlap,
             Range{0.0, 1.0},
             "... or when less than this share of the scan is near the map");
+    v.Field("min_support",
+            c.min_support,
+            Range{0.0, 1.0},
+            "... or when it has less than this share of the inliers that the first scan after the "
+            "last keyframe had");
     v.Field("wait_support",
             c.wait_support,
             Range{0.0, 1.0},

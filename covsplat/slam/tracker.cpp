@@ -100,7 +100,7 @@ TrackResult Tracker::Track(const Scan& scan, const RegistrationTarget* target) {
       result.align = Register(prepared.source, *target, prediction, gap_s);
     }
   }
-  const bool tracked = IsPlausible(result.align, gap_s);
+  const bool tracked = IsPlausible(result.align, prediction, gap_s);
   result.state = tracked ? TrackState::kTracking : TrackState::kLost;
   Conclude(scan, prepared, tracked ? result.align.motion : prediction.motion, result);
   return result;
@@ -172,12 +172,12 @@ AlignResult Tracker::Bootstrap(const Prepared& second, TrackResult& result) {
   for (int round = 0; round < kBootstrapRounds; ++round) {
     const RegistrationTarget target = TargetOf(first_->prepared.source, first_motion);
     align = Align(second.source, target, prediction, config_.gicp, pool_);
-    if (!IsPlausible(align, gap_s)) break;
+    if (!IsPlausible(align, {}, gap_s)) break;
     prediction.motion = align.motion;
     first_motion.twist =
         TwistBetween(SE3(), align.motion.T_map_sensor, gap_s, first_->prepared.timing.duration_s);
   }
-  if (!IsPlausible(align, gap_s)) first_motion = {};
+  if (!IsPlausible(align, {}, gap_s)) first_motion = {};
   TrackResult again;
   const Prepared refined = Prepare(first_->scan, first_->prepared.timing, first_motion, again);
   result.first = Deskewed(first_->scan, refined, first_motion, {});
@@ -190,12 +190,13 @@ AlignResult Tracker::Register(const SourceCloud& source,
                               const RegistrationTarget& target,
                               const MotionPrediction& prediction,
                               double gap_s) {
+  const auto is_plausible = [&](const AlignResult& a) { return IsPlausible(a, prediction, gap_s); };
   AlignResult align = Align(source, target, prediction, config_.gicp, pool_);
   const double enough = config_.recovery.search_below * usual_inlier_ratio_;
-  if (IsPlausible(align, gap_s) && align.inlier_ratio >= enough) return align;
-  AlignResult found = Search(source, target, gap_s);
-  if (!IsPlausible(found, gap_s)) return align;
-  const bool better = !IsPlausible(align, gap_s) || found.inlier_ratio > align.inlier_ratio;
+  if (is_plausible(align) && align.inlier_ratio >= enough) return align;
+  AlignResult found = Search(source, target, prediction, gap_s);
+  if (!is_plausible(found)) return align;
+  const bool better = !is_plausible(align) || found.inlier_ratio > align.inlier_ratio;
   return better ? found : align;
 }
 
@@ -203,6 +204,7 @@ AlignResult Tracker::Register(const SourceCloud& source,
 // whole scan goes on from where most of that part came to lie on the map.
 AlignResult Tracker::Search(const SourceCloud& source,
                             const RegistrationTarget& target,
+                            const MotionPrediction& prediction,
                             double gap_s) const {
   GicpConfig gicp = config_.gicp;
   gicp.max_correspondence_m *= config_.recovery.search_gate_factor;
@@ -219,20 +221,27 @@ AlignResult Tracker::Search(const SourceCloud& source,
     MotionPrediction guess;
     guess.motion.T_map_sensor = motion_.T_map_sensor * SE3::Exp(moved);
     const AlignResult align = Align(part, target, guess, brief, pool_);
-    if (!IsPlausible(align, gap_s) || align.inlier_ratio <= best_ratio) continue;
+    if (!IsPlausible(align, prediction, gap_s) || align.inlier_ratio <= best_ratio) continue;
     best_ratio = align.inlier_ratio;
     best.motion = align.motion;
   }
   return Align(source, target, best, gicp, pool_);
 }
 
-bool Tracker::IsPlausible(const AlignResult& align, double gap_s) const {
+bool Tracker::IsPlausible(const AlignResult& align,
+                          const MotionPrediction& prediction,
+                          double gap_s) const {
   const RecoveryConfig& limits = config_.recovery;
   if (align.correspondences == 0 || !align.motion.IsFinite()) return false;
   if (align.inlier_ratio < limits.min_inlier_ratio) return false;
-  const Vector6d moved = (motion_.T_map_sensor.Inverse() * align.motion.T_map_sensor).Log();
+  const SE3& T_map_sensor = align.motion.T_map_sensor;
+  const Vector6d moved = (motion_.T_map_sensor.Inverse() * T_map_sensor).Log();
+  const double off_m =
+      (T_map_sensor.Translation() - prediction.motion.T_map_sensor.Translation()).norm();
+  const double horizon_s = prediction.horizon_s;
   return moved.tail<3>().norm() <= limits.max_speed_mps * gap_s &&
-         moved.head<3>().norm() <= limits.max_turn_rate_degps * kDegree * gap_s;
+         moved.head<3>().norm() <= limits.max_turn_rate_degps * kDegree * gap_s &&
+         (horizon_s <= 0.0 || off_m <= limits.max_acceleration_mps2 * horizon_s * horizon_s);
 }
 
 TrackedScan Tracker::Deskewed(const Scan& scan,
@@ -268,7 +277,8 @@ void Tracker::Conclude(const Scan& scan,
   result.tracked.knowledge = KnowledgeOf(result.align);
   result.overlap = Overlap(result.align.squared_distance, config_.keyframe.overlap_distance_m);
   const double gap_s = prepared.timing.mid_stamp_s - last_stamp_s_;
-  if (has_motion_ && gap_s > 0.0 && result.state == TrackState::kTracking) {
+  const bool knows_last = has_motion_ || result.first.has_value();
+  if (knows_last && gap_s > 0.0 && result.state == TrackState::kTracking) {
     velocity_ = (motion_.T_map_sensor.Inverse() * motion.T_map_sensor).Log() / gap_s;
   }
   ScanMotion learnt = motion;
@@ -296,6 +306,8 @@ void Tracker::Conclude(const Scan& scan,
   best_inlier_ratio_ = std::max(best_inlier_ratio_, ratio);
   // Of given poses no inliers are known.
   if (best_inlier_ratio_ > 0.0) result.support = ratio / best_inlier_ratio_;
+  const bool has_all = result.keyframes_waiting == 0 && !result.first;
+  if (has_all && fresh_inlier_ratio_ == 0.0) fresh_inlier_ratio_ = ratio;
   result.is_keyframe = WantsKeyframe(result);
   if (result.is_keyframe) CountKeyframe(motion.T_map_sensor);
 }
@@ -305,7 +317,9 @@ bool Tracker::WantsKeyframe(const TrackResult& result) const {
   if (!T_odom_keyframe_) return true;
   const KeyframeConfig& policy = config_.keyframe;
   const Vector6d moved = (T_odom_keyframe_->Inverse() * result.tracked.T_odom_sensor).Log();
-  const bool leaves_map = result.keyframes_waiting == 0 && result.overlap < policy.min_overlap;
+  const bool leaves_map = result.keyframes_waiting == 0 &&
+                          (result.overlap < policy.min_overlap ||
+                           result.align.inlier_ratio < policy.min_support * fresh_inlier_ratio_);
   return moved.tail<3>().norm() > policy.max_distance_m ||
          moved.head<3>().norm() > policy.max_angle_deg * kDegree || leaves_map ||
          scans_since_keyframe_ >= policy.max_scans;
@@ -314,6 +328,7 @@ bool Tracker::WantsKeyframe(const TrackResult& result) const {
 void Tracker::CountKeyframe(const SE3& T_odom_sensor) {
   T_odom_keyframe_ = T_odom_sensor;
   scans_since_keyframe_ = 0;
+  fresh_inlier_ratio_ = 0.0;
   ++keyframes_;
 }
 

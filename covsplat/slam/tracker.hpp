@@ -21,6 +21,7 @@ enum class TrackState {
 struct RecoveryConfig {
   double min_inlier_ratio = 0.25;
   double max_speed_mps = 60.0;
+  double max_acceleration_mps2 = 50.0;
   double max_turn_rate_degps = 720.0;
   double search_below = 0.75;
   double search_angle_deg = 15.0;
@@ -36,6 +37,10 @@ struct RecoveryConfig {
             c.max_speed_mps,
             Range{0.1, 1000.0},
             "... or if it would have moved faster than this");
+    v.Field("max_acceleration_mps2",
+            c.max_acceleration_mps2,
+            Range{0.1, 100000.0},
+            "... or if it could only have got there by accelerating more than this");
     v.Field("max_turn_rate_degps",
             c.max_turn_rate_degps,
             Range{1.0, 36000.0},
@@ -122,8 +127,11 @@ class Tracker {
                        double gap_s);
   AlignResult Search(const SourceCloud& source,
                      const RegistrationTarget& target,
+                     const MotionPrediction& prediction,
                      double gap_s) const;
-  bool IsPlausible(const AlignResult& align, double gap_s) const;
+  bool IsPlausible(const AlignResult& align,
+                   const MotionPrediction& prediction,
+                   double gap_s) const;
   TrackedScan Deskewed(const Scan& scan,
                        const Prepared& prepared,
                        const ScanMotion& motion,
@@ -151,6 +159,8 @@ class Tracker {
   std::optional<SE3> T_odom_keyframe_;  ///< of the last keyframe
   int scans_since_keyframe_ = 0;
   int keyframes_ = 0;
+  /// Of the first scan that was registered to a target with the last keyframe in it; 0: none yet.
+  double fresh_inlier_ratio_ = 0.0;
   double usual_inlier_ratio_ = 0.0;  ///< mean over the last tracked scans
   double best_inlier_ratio_ = 0.0;   ///< highest, slowly forgotten
 };

@@ -247,7 +247,7 @@ TEST_F(TrackerTest, IsLostInGarbageAndRecovers) {
 TEST_F(TrackerTest, IsLostSomewhereElseAndRecovers) {
   Tracker tracker({}, pool_);
   TrackFirst(tracker, Drive, 4);
-  const auto elsewhere = [](double) { return MakePose(0.6, 0.4, 0, 0, 0, 0.2); };
+  const auto elsewhere = [](double) { return MakePose(0.6, 0.5, 0, 0, 0, 0.2); };
   const TrackResult lost = tracker.Track(ScanOf(elsewhere, 4, Corridor()), &map_);
   EXPECT_EQ(lost.state, TrackState::kLost);
   EXPECT_FALSE(lost.is_keyframe);
@@ -269,6 +269,22 @@ TEST_F(TrackerTest, DoesNotBelieveInImpossibleSpeeds) {
   Tracker tracker(config, pool_);
   tracker.Track(ScanOf(Drive, 0), nullptr);
   EXPECT_EQ(tracker.Track(ScanOf(Drive, 1), nullptr).state, TrackState::kLost);
+}
+
+// As from one floor of a building to the next, which looks the same.
+TEST_F(TrackerTest, DoesNotBelieveInImpossibleAccelerations) {
+  const auto jumps = [](double t) {
+    return t < StampOf(4) - 0.5 * kScanPeriod ? Still(t) : MakePose(0, 0, 0, 0.5, 0.6, 0);
+  };
+  TrackerConfig credulous;
+  credulous.recovery.max_acceleration_mps2 = 1e5;
+  for (const bool believes : {false, true}) {
+    Tracker tracker(believes ? credulous : TrackerConfig{}, pool_);
+    TrackFirst(tracker, jumps, 4);
+    const TrackResult result = tracker.Track(InstantScanOf(jumps, 4), &map_);
+    EXPECT_EQ(result.state == TrackState::kTracking, believes);
+    ExpectAt(tracker.Track(ScanOf(jumps, 5), &map_), jumps(StampOf(5)));
+  }
 }
 
 TEST_F(TrackerTest, WaitsForAFirstScanWithPoints) {
@@ -316,8 +332,11 @@ class KeyframePolicyTest : public TrackerTest {
   /// A policy that never wants a keyframe.
   static TrackerConfig Never() {
     TrackerConfig config;
-    config.keyframe = {
-        .max_distance_m = 100.0, .max_angle_deg = 360.0, .min_overlap = 0.0, .max_scans = 100000};
+    config.keyframe = {.max_distance_m = 100.0,
+                       .max_angle_deg = 360.0,
+                       .min_overlap = 0.0,
+                       .min_support = 0.0,
+                       .max_scans = 100000};
     return config;
   }
   /// Which of the scans after the first became keyframes.
@@ -355,32 +374,52 @@ TEST_F(KeyframePolicyTest, WantsOneAfterSoManyScans) {
   EXPECT_EQ(Keyframes(config, Still, 8), (Ordinals{3, 6}));
 }
 
-TEST_F(KeyframePolicyTest, WantsOneWhereTheMapEnds) {
+/// Half a room as the map of a sensor that stands in the middle and has seen all of it before.
+class MapEndTest : public KeyframePolicyTest {
+ protected:
+  MapEndTest() {
+    std::vector<TargetSurfel> surfels;
+    AppendSurfels(StillCloud(Room(), SE3(), kNoise, 100, pool_), SE3(), surfels);
+    std::erase_if(surfels, [](const TargetSurfel& s) { return s.mean.x() <= 0.0f; });
+    front_ = RegistrationTarget(surfels, Eigen::Vector3d::Zero(), 1);
+  }
+
+  RegistrationTarget front_;
+};
+
+TEST_F(MapEndTest, WantsAKeyframeWherePointsAreFarFromTheMapOrFewLieOnIt) {
+  TrackerConfig far = Never();
+  far.keyframe.min_overlap = 0.8;
+  TrackerConfig few = Never();
+  few.keyframe.min_support = 0.85;
+  for (const TrackerConfig& config : {far, few}) {
+    Tracker tracker(config, pool_);
+    TrackFirst(tracker, Still, 2);
+    const TrackResult inside = tracker.Track(ScanOf(Still, 2), &map_);
+    EXPECT_GT(inside.overlap, 0.8);
+    EXPECT_GT(inside.support, 0.95);
+    EXPECT_FALSE(inside.is_keyframe);
+    const TrackResult outside = tracker.Track(ScanOf(Still, 3), &front_);
+    ExpectAt(outside, SE3());
+    EXPECT_LT(outside.overlap, 0.8);
+    EXPECT_LT(outside.support, 0.8);
+    EXPECT_TRUE(outside.is_keyframe);
+    const TrackResult next = tracker.Track(ScanOf(Still, 4), &front_);
+    EXPECT_LT(next.overlap, 0.8);
+    EXPECT_EQ(next.keyframes_waiting, 1);
+    EXPECT_FALSE(next.is_keyframe) << "the keyframe that would fill the gap is on its way";
+  }
+}
+
+TEST_F(MapEndTest, MissesNothingThatWasNeverThere) {
   TrackerConfig config = Never();
-  config.keyframe.min_overlap = 0.8;
+  config.keyframe.min_support = 0.6;
   Tracker tracker(config, pool_);
-  TrackFirst(tracker, Still, 2);
-  const TrackResult inside = tracker.Track(ScanOf(Still, 2), &map_);
-  EXPECT_GT(inside.overlap, 0.8);
-  EXPECT_GT(inside.support, 0.95);
-  EXPECT_FALSE(inside.is_keyframe);
-  std::vector<TargetSurfel> half;
-  const SourceCloud cloud = StillCloud(Room(), SE3(), kNoise, 100, pool_);
-  std::vector<TargetSurfel> whole;
-  AppendSurfels(cloud, SE3(), whole);
-  std::copy_if(whole.begin(), whole.end(), std::back_inserter(half), [](const TargetSurfel& s) {
-    return s.mean.x() > 0.0f;
-  });
-  const RegistrationTarget front(half, Eigen::Vector3d::Zero(), 1);
-  const TrackResult outside = tracker.Track(ScanOf(Still, 3), &front);
-  ExpectAt(outside, SE3());
-  EXPECT_LT(outside.overlap, 0.8);
-  EXPECT_LT(outside.support, 0.8);
-  EXPECT_TRUE(outside.is_keyframe);
-  const TrackResult next = tracker.Track(ScanOf(Still, 4), &front);
-  EXPECT_LT(next.overlap, 0.8);
-  EXPECT_EQ(next.keyframes_waiting, 1);
-  EXPECT_FALSE(next.is_keyframe) << "the keyframe that would fill the gap is on its way";
+  for (int k = 0; k < 5; ++k) {
+    const TrackResult result = tracker.Track(ScanOf(Still, k), &front_);
+    EXPECT_EQ(result.support<0.6, k> 1);
+    EXPECT_FALSE(result.is_keyframe);
+  }
 }
 
 class FollowTest : public TrackerTest {
