@@ -1,8 +1,10 @@
 #include "apps/scan_feed.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <iterator>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -13,6 +15,9 @@ namespace covsplat {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+// For waits that nothing ends when `stop` begins to say so.
+constexpr std::chrono::milliseconds kPatience{50};
 
 class FileFeed : public ScanFeed {
  public:
@@ -61,6 +66,72 @@ class FileFeed : public ScanFeed {
   std::vector<FeedProblem> problems_;
 };
 
+class ReadAheadFeed : public ScanFeed {
+ public:
+  ReadAheadFeed(std::unique_ptr<ScanFeed> feed, std::function<bool()> stop)
+      : feed_(std::move(feed)), stop_(std::move(stop)) {}
+  ~ReadAheadFeed() override { thread_ = {}; }  // asks it to stop and joins
+
+  std::optional<FedScan> Next() override {
+    if (ended_ || stop_()) return std::nullopt;
+    if (!thread_.joinable()) {
+      thread_ = std::jthread([this](const std::stop_token& token) { ReadAhead(token); });
+    }
+    Entry next;
+    {
+      std::unique_lock lock(mutex_);
+      while (read_.empty() && !stop_()) news_.wait_for(lock, kPatience);
+      if (read_.empty()) return std::nullopt;
+      next = std::move(read_.front());
+      read_.pop_front();
+    }
+    room_.notify_one();
+    counts_ = next.counts;
+    std::ranges::move(next.problems, std::back_inserter(problems_));
+    ended_ = !next.scan;
+    if (next.scan) next.scan->arrival = Clock::now();
+    return std::move(next.scan);
+  }
+
+  FeedCounts Counts() override { return counts_; }
+  std::vector<FeedProblem> TakeProblems() override { return std::exchange(problems_, {}); }
+
+ private:
+  /// A scan, none at the end, and what was known of the feed once it was read.
+  struct Entry {
+    std::optional<FedScan> scan;
+    FeedCounts counts;
+    std::vector<FeedProblem> problems;
+  };
+
+  void ReadAhead(const std::stop_token& token) {
+    for (bool more = true; more;) {
+      Entry entry;
+      entry.scan = feed_->Next();
+      entry.counts = feed_->Counts();
+      entry.problems = feed_->TakeProblems();
+      more = entry.scan.has_value();
+      std::unique_lock lock(mutex_);
+      if (!room_.wait(lock, token, [&] { return read_.size() < kMaxReadAhead; })) return;
+      read_.push_back(std::move(entry));
+      news_.notify_one();
+    }
+  }
+
+  const std::unique_ptr<ScanFeed> feed_;  // of the thread
+  const std::function<bool()> stop_;
+  std::mutex mutex_;
+  std::condition_variable news_;
+  std::condition_variable_any room_;
+  std::deque<Entry> read_;  // guarded by mutex_
+  // Of the caller.
+  FeedCounts counts_;
+  std::vector<FeedProblem> problems_;
+  bool ended_ = false;
+
+  std::jthread thread_;  // last: joins before the rest goes
+};
+
 class RealtimeFeed : public ScanFeed {
  public:
   RealtimeFeed(std::unique_ptr<ScanFeed> feed, std::function<bool()> stop)
@@ -93,8 +164,6 @@ class RealtimeFeed : public ScanFeed {
   }
 
  private:
-  static constexpr std::chrono::milliseconds kPatience{50};
-
   void Deliver(const std::stop_token& token) {
     Clock::time_point start;
     std::optional<double> first_stamp_s;
@@ -155,6 +224,11 @@ std::unique_ptr<ScanFeed> MakeFeed(std::unique_ptr<ScanSource> source,
                                    std::int64_t jump,
                                    std::function<bool()> stop) {
   return std::make_unique<FileFeed>(std::move(source), jump, std::move(stop));
+}
+
+std::unique_ptr<ScanFeed> MakeReadAheadFeed(std::unique_ptr<ScanFeed> feed,
+                                            std::function<bool()> stop) {
+  return std::make_unique<ReadAheadFeed>(std::move(feed), std::move(stop));
 }
 
 std::unique_ptr<ScanFeed> MakeRealtimeFeed(std::unique_ptr<ScanFeed> feed,

@@ -48,6 +48,15 @@ std::unique_ptr<ScanFeed> MakeFeed(std::unique_ptr<ScanSource> source,
                                    std::int64_t jump,
                                    std::function<bool()> stop);
 
+/// So many scans are read before they are asked for.
+inline constexpr std::size_t kMaxReadAhead = 10;
+
+/// The scans of another feed, read ahead in a thread of its own from the first call on, so that
+/// files that are slow for a moment keep nobody waiting. What went wrong is told, and counted, when
+/// the scan after it is handed out.
+std::unique_ptr<ScanFeed> MakeReadAheadFeed(std::unique_ptr<ScanFeed> feed,
+                                            std::function<bool()> stop);
+
 /// So many scans wait to be taken in real time: one delay costs none, and who is always too slow is
 /// not far behind.
 inline constexpr std::size_t kMaxWaitingScans = 2;

@@ -49,6 +49,7 @@ Result<Prepared> Prepare(RunRequest& request) {
   run.results.source = (*source)->Description();
   run.scans = ((*source)->ScanCount() + request.jump - 1) / request.jump;
   run.feed = MakeFeed(std::move(*source), request.jump, Interrupted);
+  run.feed = MakeReadAheadFeed(std::move(run.feed), Interrupted);
   if (request.realtime) run.feed = MakeRealtimeFeed(std::move(run.feed), Interrupted);
 
   auto truth = LoadTruth(request.recording, request.truth, request.config.input.scan_period_s);

@@ -1,5 +1,7 @@
 #include "apps/scan_feed.hpp"
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <thread>
 
@@ -33,6 +35,12 @@ std::unique_ptr<ScanFeed> FeedOf(std::vector<double> stamps, std::int64_t jump =
   return MakeFeed(std::make_unique<FakeSource>(std::move(stamps)), jump, [] { return false; });
 }
 
+std::vector<double> EvenStamps(int count, double period_s) {
+  std::vector<double> stamps(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) stamps[static_cast<std::size_t>(i)] = period_s * i;
+  return stamps;
+}
+
 std::vector<std::int64_t> Drain(ScanFeed& feed) {
   std::vector<std::int64_t> scans;
   while (const auto fed = feed.Next()) scans.push_back(fed->scan.index);
@@ -63,10 +71,63 @@ TEST(ScanFeedTest, StopEndsIt) {
   EXPECT_FALSE(feed->Next());
 }
 
+/// Takes a moment for each scan, and counts those that were read.
+class SlowSource : public FakeSource {
+ public:
+  SlowSource(std::vector<double> stamps, std::atomic<int>& read)
+      : FakeSource(std::move(stamps)), read_(read) {}
+
+  Result<std::optional<Scan>> Next() override {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ++read_;
+    return FakeSource::Next();
+  }
+
+ private:
+  std::atomic<int>& read_;
+};
+
+TEST(ScanFeedTest, ReadAheadHandsOutTheSameAndTellsOfProblemsInTheirPlace) {
+  const std::vector<double> stamps = {0.0, 0.1, -1.0, 0.05, 0.2, 0.3, -1.0};
+  const auto plain = FeedOf(stamps);
+  const auto ahead = MakeReadAheadFeed(FeedOf(stamps), [] { return false; });
+  for (bool more = true; more;) {
+    const auto expected = plain->Next();
+    const auto fed = ahead->Next();
+    more = fed.has_value();
+    ASSERT_EQ(more, expected.has_value());
+    if (more) {
+      EXPECT_EQ(fed->scan.index, expected->scan.index);
+    }
+    EXPECT_EQ(ahead->Counts().damaged, plain->Counts().damaged);
+    EXPECT_EQ(ahead->Counts().backwards, plain->Counts().backwards);
+    EXPECT_EQ(ahead->TakeProblems().size(), plain->TakeProblems().size());
+  }
+  EXPECT_FALSE(ahead->Next());
+}
+
+TEST(ScanFeedTest, ReadAheadIsBoundedAndCanBeAbandoned) {
+  std::atomic<int> read = 0;
+  auto source = std::make_unique<SlowSource>(EvenStamps(200, 0.1), read);
+  const auto never = [] { return false; };
+  const auto feed = MakeReadAheadFeed(MakeFeed(std::move(source), 1, never), never);
+  ASSERT_TRUE(feed->Next());
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_GT(read, 5);
+  EXPECT_LE(read, static_cast<int>(kMaxReadAhead) + 2) << "one is out, one in the reader's hand";
+  ASSERT_TRUE(feed->Next());
+}
+
+TEST(ScanFeedTest, ReadAheadStops) {
+  std::atomic<bool> stop = false;
+  const auto feed = MakeReadAheadFeed(FeedOf({0.0, 0.1, 0.2}), [&] { return stop.load(); });
+  EXPECT_TRUE(feed->Next());
+  stop = true;
+  EXPECT_FALSE(feed->Next());
+}
+
 TEST(ScanFeedTest, RealtimeKeepsTheNewestScansAndCountsTheOthers) {
-  std::vector<double> stamps;
-  for (int i = 0; i < 40; ++i) stamps.push_back(0.01 * i);
-  const auto feed = MakeRealtimeFeed(FeedOf(stamps), [] { return false; });
+  const auto feed = MakeRealtimeFeed(FeedOf(EvenStamps(40, 0.01)), [] { return false; });
   const auto start = std::chrono::steady_clock::now();
   std::vector<std::int64_t> scans;
   while (const auto fed = feed->Next()) {
