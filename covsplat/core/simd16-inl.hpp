@@ -312,10 +312,11 @@ HWY_INLINE hn::Vec<hn::CappedTag<S, kBlock<S>>> SumOfBlocks(D d, V v) {
   }
 }
 
-/// Sums of the lanes of packs, a multiple of 4: out[k] = sum of terms[k], in an order that depends
-/// on nothing but the instruction set.
+/// Adds the sums of the lanes of packs, a multiple of 4, to what was before: out[k] = before[k] +
+/// sum of terms[k], in an order that depends on nothing but the instruction set. Both may be the
+/// same.
 template <class S, std::size_t kCount>
-HWY_INLINE void SumEach(const Pack<S> (&terms)[kCount], S* HWY_RESTRICT out) {
+HWY_INLINE void AddSumOfEach(const Pack<S> (&terms)[kCount], const S* before, S* out) {
   const Tag<S> d;
   hn::Vec<Tag<S>> v[kCount];
   for (std::size_t k = 0; k < kCount; ++k) {
@@ -334,13 +335,13 @@ HWY_INLINE void SumEach(const Pack<S> (&terms)[kCount], S* HWY_RESTRICT out) {
       const auto qw = hn::BitCast(wide, q);
       const auto sums = hn::Add(hn::BitCast(d, hn::InterleaveLower(wide, pw, qw)),
                                 hn::BitCast(d, hn::InterleaveUpper(wide, pw, qw)));
-      hn::StoreU(SumOfBlocks<S>(d, sums), block, out + k);
+      hn::StoreU(hn::Add(hn::LoadU(block, before + k), SumOfBlocks<S>(d, sums)), block, out + k);
     }
   } else {
     for (std::size_t k = 0; k < kCount; k += 2) {
       const auto sums =
           hn::Add(hn::InterleaveLower(d, v[k], v[k + 1]), hn::InterleaveUpper(d, v[k], v[k + 1]));
-      hn::StoreU(SumOfBlocks<S>(d, sums), block, out + k);
+      hn::StoreU(hn::Add(hn::LoadU(block, before + k), SumOfBlocks<S>(d, sums)), block, out + k);
     }
   }
 }

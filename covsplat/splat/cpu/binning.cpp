@@ -97,10 +97,15 @@ void TileBinner::PlaceChunks(std::size_t tiles, std::size_t chunks) {
 }
 
 void TileBinner::AssignSlots() {
+  constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  // visit(pair, whether its record has had a pair in the same group of tiles).
   const auto for_each_pair = [&](auto&& visit) {
+    last_group_.assign(records_, kNone);
     for (std::size_t tile = 0; tile < bins_.tile_begin.size(); ++tile) {
+      const auto group = static_cast<std::uint32_t>(tile / kSlotGroup);
       for (std::uint32_t k = bins_.tile_begin[tile]; k < bins_.tile_end[tile]; ++k) {
-        visit(bins_.pairs[k]);
+        TilePair& pair = bins_.pairs[k];
+        visit(pair, std::exchange(last_group_[pair.record], group) == group);
       }
     }
   };
@@ -108,9 +113,13 @@ void TileBinner::AssignSlots() {
   // and has moved on to where it ends when all its pairs have taken their slots.
   std::vector<std::uint32_t>& next = bins_.slot_begin;
   next.assign(records_ + 2, 0);
-  for_each_pair([&](const TilePair& pair) { ++next[pair.record + 2]; });
+  for_each_pair(
+      [&](const TilePair& pair, bool shares) { next[pair.record + 2] += shares ? 0 : 1; });
   std::partial_sum(next.begin(), next.end(), next.begin());
-  for_each_pair([&](TilePair& pair) { pair.slot = next[pair.record + 1]++; });
+  for_each_pair([&](TilePair& pair, bool shares) {
+    next[pair.record + 1] += shares ? 0 : 1;
+    pair.slot = next[pair.record + 1] - 1;
+  });
   next.pop_back();
 }
 

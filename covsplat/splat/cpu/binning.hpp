@@ -6,6 +6,9 @@
 
 namespace covsplat {
 
+/// Tiles that follow each other in a row; who works on one works on all, in order.
+inline constexpr std::size_t kSlotGroup = 4;
+
 /// Sorts the visible records once by the range of their centres (ties by index), then scatters them
 /// into the tiles of their boxes, so that every list comes out sorted. Scratch memory and result
 /// are kept from call to call.
@@ -20,6 +23,7 @@ class TileBinner {
            std::span<const TileBox> boxes);
 
   /// Gives the pairs that are in the tiles' lists their slots, ordered by record, then by tile.
+  /// Pairs of one record in the same group of kSlotGroup tiles share one.
   /// Best when what no pixel sees has been dropped: slots are then few and lie close together.
   void AssignSlots();
 
@@ -43,7 +47,8 @@ class TileBinner {
   std::size_t records_ = 0;
   std::vector<KeyedRecord> order_;
   std::vector<KeyedRecord> scratch_;
-  std::vector<std::uint32_t> cursor_;  ///< [chunks of order_ x tiles]
+  std::vector<std::uint32_t> last_group_;  ///< [records] that slots were assigned to
+  std::vector<std::uint32_t> cursor_;      ///< [chunks of order_ x tiles]
 };
 
 }  // namespace covsplat

@@ -1,6 +1,5 @@
 #include "covsplat/splat/cpu/optimize.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -46,7 +45,6 @@ HWY_INLINE bool SumSlots(const OptimizeJob<S>& job, std::uint32_t number, S* row
     seen[lane] = state != kUnseen ? S(1) : S(0);
     any |= state;
   }
-  std::fill(job.slot_state + slot_begin[0], job.slot_state + slot_begin[kBlockSize], kUnseen);
   return any != kUnseen;
 }
 

@@ -21,7 +21,7 @@ struct OptimizeJob {
   const SurfelRecord<S>* records = nullptr;
   const TileBins* bins = nullptr;
   const S* slots = nullptr;
-  SlotState* slot_state = nullptr;
+  const SlotState* slot_state = nullptr;
 
   // Optimising: moments, loss (for the scale term) and steps. Gradients only: `gradients`.
   MomentColumns<S>* moments = nullptr;

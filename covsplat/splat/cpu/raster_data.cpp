@@ -47,6 +47,14 @@ void TileImages<S>::Resize(std::size_t tiles) {
   }
 }
 
+std::size_t TileBins::ListedPairs() const {
+  std::size_t listed = 0;
+  for (std::size_t tile = 0; tile < tile_begin.size(); ++tile) {
+    listed += tile_end[tile] - tile_begin[tile];
+  }
+  return listed;
+}
+
 template <class S>
 void TileGradients<S>::Resize(std::size_t tiles) {
   for (auto* image : {&alpha, &range_sum, &median, &normal_x, &normal_y, &normal_z}) {

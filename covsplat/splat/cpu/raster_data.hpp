@@ -54,15 +54,18 @@ std::size_t PixelIndex(const ViewGeometry<S>& view, int row, int column) {
 
 /// Which Gaussians touch which tile, front to back.
 struct TileBins {
+  /// Those that have not been dropped from the lists.
+  std::size_t ListedPairs() const;
+
   std::vector<std::uint32_t> tile_begin;  ///< [tiles] into pairs
   std::vector<std::uint32_t> tile_end;    ///< [tiles]
   std::vector<TilePair> pairs;
   std::vector<std::uint32_t> slot_begin;  ///< [records + 1]; empty: slots are not assigned yet
 };
 
-/// What a pass over the tiles left in the slot of a pair.
+/// What a pass over the tiles left in a slot.
 enum SlotState : std::uint8_t {
-  kUnseen = 0,   ///< nothing: no pixel sees the Gaussian
+  kUnseen = 0,   ///< nothing: no pixel of its tiles sees the Gaussian
   kSeen = 1,     ///< nothing: pixels see it, but have no gradient for it
   kWritten = 3,  ///< the sums
 };

@@ -415,8 +415,8 @@ struct RayGradient {
   Pack<S> range;   ///< dL/d range
 };
 
-/// Sums the gradient of one kept Gaussian over the tile's pixels into its slot. `kept_range`: as
-/// in KeptSurfels.
+/// Adds the gradient of one kept Gaussian, summed over the tile's pixels, to the sums `before` into
+/// its slot. `kept_range`: as in KeptSurfels.
 template <Pass kPass, class S>
 HWY_INLINE void SumSurfelGradient(S lowpass,
                                   const TileRays<S>& rays,
@@ -424,6 +424,7 @@ HWY_INLINE void SumSurfelGradient(S lowpass,
                                   const Pack<S>& kept_range,
                                   const RayGradient<S>& ray,
                                   const Pack3<S>& g_normal,
+                                  const S* before,
                                   S* slot) {
   const auto on_surface = kept_range > All(S(0));
   // A pass that only learns from surfaces has no other rays with a gradient.
@@ -452,7 +453,7 @@ HWY_INLINE void SumSurfelGradient(S lowpass,
                              ray.weight * g_normal.x,
                              ray.weight * g_normal.y,
                              ray.weight * g_normal.z};
-  SumEach(terms, slot);
+  AddSumOfEach(terms, before, slot);
   const Pack<S> zero = All(S(0));
   if constexpr (kPass == Pass::kLearn) {
     StoreZeros<4>(slot + kSlotColumn);
@@ -462,7 +463,7 @@ HWY_INLINE void SumSurfelGradient(S lowpass,
     const Pack<S> g_filter = All(-lowpass) * Select(on_surface, zero, ray.alpha);
     const Pack<S> filter_terms[4] = {
         g_filter * dx, g_filter * dy, Select(on_surface, zero, ray.range), zero};
-    SumEach(filter_terms, slot + kSlotColumn);
+    AddSumOfEach(filter_terms, before + kSlotColumn, slot + kSlotColumn);
   }
 }
 
@@ -475,6 +476,7 @@ HWY_INLINE void BackTile(const TileJob<S>& job,
                          const ImageGradient<S>& g,
                          const KeptSurfels<S>& kept,
                          std::size_t count) {
+  alignas(64) static constexpr S kNothing[16] = {};
   const Pack<S> zero = All(S(0));
   // A loss may leave out what only the screen-space filter shows.
   const bool through_filter =
@@ -507,11 +509,15 @@ HWY_INLINE void BackTile(const TileJob<S>& job,
     suffix = suffix + gained;
     auto reached = (alpha > zero) & (range < g.hidden_from);
     if (!through_filter) reached = reached & (kept_range > zero);
+    SlotState& state = slot_state[pair.slot];
     if (None(reached)) {
-      slot_state[pair.slot] = kSeen;
+      state = std::max(state, kSeen);
       continue;
     }
-    slot_state[pair.slot] = kWritten;
+    S* slot = slots + 16 * static_cast<std::size_t>(pair.slot);
+    // Whether tiles before have written is hard to guess: choose an address, not a branch.
+    const S* before = state == kWritten ? slot : kNothing;
+    state = kWritten;
     const auto below_cap = reached & (alpha < All(limits.alpha_cap));
     const auto in_cap = reached & (miss < ranges.cap);
     RayGradient<S> ray;
@@ -522,8 +528,7 @@ HWY_INLINE void BackTile(const TileJob<S>& job,
       const auto is_median = reached & Equal(blend.median_entry, All(static_cast<S>(i)));
       ray.range = ray.range + MulAdd(ray.weight, g.range_sum, SelectOrZero(is_median, g.median));
     }
-    S* slot = slots + 16 * static_cast<std::size_t>(pair.slot);
-    SumSurfelGradient<kPass>(limits.lowpass, rays, s, kept_range, ray, g.normal, slot);
+    SumSurfelGradient<kPass>(limits.lowpass, rays, s, kept_range, ray, g.normal, before, slot);
   }
 }
 

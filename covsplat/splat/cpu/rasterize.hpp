@@ -20,8 +20,8 @@ struct TileJob {
   const TileTargets<S>* targets = nullptr;
   const LossConfig* loss = nullptr;
   const TileGradients<S>* upstream = nullptr;  ///< may be null
-  S* slots = nullptr;                          ///< [16 x pairs]
-  SlotState* slot_state = nullptr;             ///< [pairs]
+  S* slots = nullptr;                          ///< [slots x 16]
+  SlotState* slot_state = nullptr;             ///< [slots]
 };
 
 /// Renders tiles [begin, end) into `images`.

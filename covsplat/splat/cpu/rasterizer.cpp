@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t kBlocksPerTask = 128;
 constexpr std::size_t kTilesPerTask = 64;
+static_assert(kTilesPerTask % kSlotGroup == 0);
 
 }  // namespace
 
@@ -76,7 +77,7 @@ void Rasterizer<S>::PrepareSlots() {
   binner_.AssignSlots();
   const std::size_t slots = binner_.Bins().slot_begin.back();
   slots_.resize(16 * slots);
-  slot_state_.assign(slots, kUnseen);
+  slot_state_.resize(slots);
 }
 
 template <class S>
@@ -90,6 +91,7 @@ void Rasterizer<S>::Render() {
 template <class S>
 LossSums Rasterizer<S>::RunStep(TileJob<S> job) {
   PrepareSlots();
+  std::ranges::fill(slot_state_, kUnseen);
   job.slots = slots_.data();
   job.slot_state = slot_state_.data();
   return ParallelSum(

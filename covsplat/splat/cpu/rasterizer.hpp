@@ -47,7 +47,8 @@ class Rasterizer {
   const TileImages<S>& Images() const { return images_; }
   /// (Gaussian, tile) pairs of the current bins: the size of the work.
   std::size_t Pairs() const { return binner_.Bins().pairs.size(); }
-  /// Those of them that some pixel saw when the last gradient was made after binning.
+  /// Those of them that are left in the tiles' lists: once a gradient was made, what pixels see.
+  std::size_t ListedPairs() const { return binner_.Bins().ListedPairs(); }
   std::size_t Slots() const { return slot_state_.size(); }
   std::size_t ActiveBlocks() const { return active_.size(); }
 
