@@ -3,7 +3,7 @@
 
 usage: tools/count_instructions.py BENCH_FOLDER [--check FILE] [--tolerance 0.03]
 
-BENCH_FOLDER holds the release builds of splat_bench and registration_bench. Prints instructions per
+BENCH_FOLDER holds the release builds of scaling_bench and registration_bench. Prints instructions per
 unit of work as JSON. With --check, fails if a count is more than the tolerance above that of FILE.
 
 Valgrind knows no AVX-512, so it is the AVX2 kernels that are counted. They grow and shrink with the
@@ -19,10 +19,12 @@ import sys
 import tempfile
 
 # What is counted: benchmark, its filter, the function inside which instructions count, and how many
-# units of work one iteration of the benchmark calls it for.
+# units of work one iteration of the benchmark calls it for. Benchmarks with one thread only: those of
+# other threads would not be counted.
 KERNELS = {
-    "optimiser step, 30k Gaussians, 64 x 1024": (
-        "splat_bench", "BM_Step/cpu/30000/", "covsplat::CpuEngine::Step(*", 10),
+    "optimiser step, 100k Gaussians, 64 x 1024": (
+        "scaling_bench", "BM_StepByWork/threads:1/beams:64/gaussians:100000/",
+        "covsplat::CpuEngine::Step(*", 10),
     "preparation of a scan": (
         "registration_bench", "BM_Preprocess/1/", "covsplat::Preprocess(*", 1),
     "registration of a scan": (
@@ -34,7 +36,6 @@ def count(folder, program, benchmark, function, units):
     """Instructions per unit in one iteration of a benchmark."""
     with tempfile.TemporaryDirectory() as scratch:
         command = [
-            "taskset", "--cpu-list", "0",  # one core: pools have one thread, which is counted whole
             "valgrind", "--tool=callgrind", f"--toggle-collect={function}",
             f"--callgrind-out-file={scratch}/out",
             str(folder / program), f"--benchmark_filter=^{benchmark}", "--benchmark_min_time=1e-9"]
