@@ -82,7 +82,8 @@ class Aligner {
   }
 
  private:
-  // A step is undone if it makes the median residual worse by this.
+  // A step is undone if it makes the median residual worse by this, a stretched one if it makes it
+  // worse at all.
   static constexpr double kWorse = 1.5;
   static constexpr double kFirstDamping = 1e-2;
   static constexpr double kMaxDamping = 1e3;
@@ -116,11 +117,13 @@ class Aligner {
       const double factor = settled && !IsSmall(step, kStretchFrom) ? stretch.Of(step) : 1.0;
       const ScanMotion candidate = Moved(result_.motion, factor * step);
       const PhaseMoments next = Evaluate(candidate, stride);
-      if (next.matches < kMinMatches || median_ > kWorse * accepted_median + kMinKernelScale) {
+      const double worse = factor > 1.0 ? 1.0 : kWorse;
+      if (next.matches < kMinMatches || median_ > worse * accepted_median + kMinKernelScale) {
         median_ = accepted_median;
+        stretch.Forget();
+        if (factor > 1.0) continue;
         damping_ = std::max(10.0 * damping_, kFirstDamping);
         if (damping_ > kMaxDamping) break;
-        stretch.Forget();
         continue;
       }
       result_.motion = candidate;
