@@ -5,6 +5,7 @@
 #include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "apps/facts.hpp"
 #include "apps/finished_run.hpp"
@@ -15,6 +16,7 @@
 
 #include "covsplat/io/text.hpp"
 #include "covsplat/io/trajectory_file.hpp"
+#include "covsplat/loops/g2o_file.hpp"
 
 namespace covsplat {
 namespace {
@@ -73,6 +75,38 @@ Result<Trajectory> TrackedPoses(const fs::path& run) {
   return poses;
 }
 
+/// Each pose moved as the last keyframe up to it.
+Trajectory MovedWithKeyframes(const Trajectory& tracked,
+                              const Trajectory& keyframes,
+                              const std::vector<SE3>& T_map_keyframe) {
+  Trajectory moved;
+  moved.reserve(tracked.size());
+  std::size_t k = 0;
+  for (const TimedPose& pose : tracked) {
+    while (k + 1 < keyframes.size() && keyframes[k + 1].stamp_s <= pose.stamp_s) ++k;
+    const SE3 T_keyframe_sensor = keyframes[k].T_world_sensor.Inverse() * pose.T_world_sensor;
+    moved.push_back({pose.stamp_s, T_map_keyframe[k] * T_keyframe_sensor});
+  }
+  return moved;
+}
+
+Result<Trajectory> CorrectedBy(const fs::path& g2o,
+                               const Trajectory& tracked,
+                               const Trajectory& keyframes,
+                               const PoseGraphConfig& solver) {
+  const Result<PoseGraph> graph = ReadG2o(g2o);
+  if (!graph) return Forward(graph);
+  if (graph->T_map_node.size() != keyframes.size()) {
+    return Fail(ErrorCode::kInput,
+                "{}: has {} vertices, but the run {} keyframes; take the run's pose_graph.g2o and "
+                "add edges only",
+                g2o.string(),
+                graph->T_map_node.size(),
+                keyframes.size());
+  }
+  return MovedWithKeyframes(tracked, keyframes, Optimize(*graph, solver).T_map_node);
+}
+
 Result<KnownRun> ReadKnown(const OptimizeRequest& request) {
   KnownRun known;
   const Result<void> complete = CheckRunFiles(
@@ -94,6 +128,12 @@ Result<KnownRun> ReadKnown(const OptimizeRequest& request) {
   if (const Result<void> valid = CheckConfig(*resolved); !valid) return Forward(valid);
   known.config = std::move(*resolved);
   known.config.slam.system.schedule = Schedule::kLockstep;
+  if (request.graph) {
+    const PoseGraphConfig& solver = known.config.slam.loops.closer.graph;
+    Result<Trajectory> corrected = CorrectedBy(*request.graph, known.tracked, *keyframes, solver);
+    if (!corrected) return Forward(corrected);
+    known.tracked = std::move(*corrected);
+  }
   return known;
 }
 

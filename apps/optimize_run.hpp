@@ -14,6 +14,8 @@ namespace covsplat {
 struct OptimizeRequest {
   std::filesystem::path run;                       ///< folder of a finished run
   std::optional<std::filesystem::path> recording;  ///< of the run, if it has moved
+  /// A .g2o file, the run's own with edges or priors added: its solution corrects the trajectory.
+  std::optional<std::filesystem::path> graph;
   RunFolderRequest folder;
   ConfigOptions config;         ///< on top of the run's own
   int steps_per_keyframe = 20;  ///< over all views, when the map is made

@@ -12,6 +12,7 @@ namespace {
 struct OptimizeOptions {
   std::string run;
   std::string recording;
+  std::string graph;
   std::string out;
   bool overwrite = false;
   ConfigOptions config;
@@ -25,6 +26,7 @@ OptimizeRequest RequestOf(const OptimizeOptions& o) {
   OptimizeRequest request;
   request.run = o.run;
   if (!o.recording.empty()) request.recording = o.recording;
+  if (!o.graph.empty()) request.graph = o.graph;
   if (!o.out.empty()) request.folder.out = o.out;
   request.folder.overwrite = o.overwrite;
   request.config = o.config;
@@ -49,6 +51,12 @@ void AddOptimizeCommand(CLI::App& app, int& exit_code) {
   optimize
       ->add_option("--recording", options->recording, "Its recording, if it is not where it was")
       ->type_name("DIR");
+  optimize
+      ->add_option("--graph",
+                   options->graph,
+                   "Begin with the solution of this pose graph: the run's pose_graph.g2o with "
+                   "edges or priors added")
+      ->type_name("FILE");
   optimize->add_option("-o,--out", options->out, "Output folder; default: covsplat_out/<date_time>")
       ->type_name("DIR");
   optimize->add_flag("--overwrite", options->overwrite, "Replace the files of an earlier run");

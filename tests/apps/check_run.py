@@ -175,6 +175,32 @@ def a_finished_run_is_optimized_the_same_way_every_time(bench):
 
 
 @case
+def a_pose_graph_with_a_prior_added_moves_a_finished_run(bench):
+    expect(bench.run(bench.good, "drifted", "--deterministic", "-s", "keyframe.max_scans=3"), 0)
+    run = bench.folder / "drifted"
+    graph = (run / "pose_graph.g2o").read_text()
+    last = max(int(line.split()[1]) for line in graph.splitlines() if line.startswith("VERTEX"))
+    vertex = next(line for line in graph.splitlines() if line.startswith(f"VERTEX_SE3:QUAT {last} "))
+    x, *rest = vertex.split()[2:]
+    sure = " ".join("1e12" if row == column else "0" for row in range(6) for column in range(row, 6))
+    prior = f"EDGE_SE3_PRIOR {last} 0 {float(x) + 0.05} {' '.join(rest)} {sure}"
+    (bench.folder / "same.g2o").write_text(graph)
+    (bench.folder / "moved.g2o").write_text(graph + prior + "\n")
+    (bench.folder / "short.g2o").write_text("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n")
+    ends = []
+    for name in ["same", "moved"]:
+        expect(bench.call("optimize", run, "-o", name, "--graph", bench.folder / f"{name}.g2o",
+                          "--steps", "0", "-s", "loops.stitch.enabled=false"), 0)
+        ends.append(float(poses(bench.folder / name)[-1][1]))
+    assert abs(ends[0] - float(poses(run)[-1][1])) < 0.01, ends
+    assert abs(ends[1] - ends[0] - 0.05) < 0.01, ends
+    expect(bench.call("optimize", run, "-o", "x", "--graph", "nowhere.g2o"), 3, err="nowhere.g2o")
+    expect(bench.call("optimize", run, "-o", "x", "--graph", bench.folder / "short.g2o"), 3,
+           err="1 vertices")
+    assert not (bench.folder / "x").exists()
+
+
+@case
 def maps_convert_between_all_formats_and_every_verb_reads_them(bench):
     expect(bench.run(bench.good, "converted", "--deterministic"), 0)
     run = bench.folder / "converted"
