@@ -40,19 +40,19 @@ ViewGeometry<S>::ViewGeometry(const SensorModel& sensor, const RasterConfig& con
   }
 }
 
-template <class S>
-void TileImages<S>::Resize(std::size_t tiles) {
-  for (auto* image : {&transmittance, &range_sum, &median, &normal_x, &normal_y, &normal_z}) {
-    image->assign(tiles * kTilePixels, S(0));
-  }
-}
-
 std::size_t TileBins::ListedPairs() const {
   std::size_t listed = 0;
   for (std::size_t tile = 0; tile < tile_begin.size(); ++tile) {
     listed += tile_end[tile] - tile_begin[tile];
   }
   return listed;
+}
+
+template <class S>
+void TileImages<S>::Resize(std::size_t tiles) {
+  for (auto* image : {&transmittance, &range_sum, &median, &normal_x, &normal_y, &normal_z}) {
+    image->assign(tiles * kTilePixels, S(0));
+  }
 }
 
 template <class S>
