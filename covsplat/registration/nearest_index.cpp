@@ -60,8 +60,8 @@ NearestIndex::NearestIndex(std::span<const Eigen::Vector3f> points, float cell_m
   }
   const auto cell_of = [&](std::size_t i) {
     const Block& block = blocks_[static_cast<std::size_t>(place[i].first)];
-    const int before = std::popcount(block.cells & Lowest(place[i].second));
-    return static_cast<std::size_t>(block.first + before);
+    const int cell = block.first + std::popcount(block.cells & Lowest(place[i].second));
+    return static_cast<std::size_t>(cell);
   };
   begin_.assign(static_cast<std::size_t>(cells) + 1, 0);
   for (std::size_t i = 0; i < n; ++i) ++begin_[cell_of(i) + 1];

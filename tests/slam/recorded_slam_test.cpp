@@ -30,6 +30,7 @@ std::vector<ScanRecord> Follow(const SlamConfig& config, const std::vector<Scan>
   const SensorEstimate sensor = EstimateSensorModel(scans, {});
   const auto system = std::move(SlamSystem::Create(config, sensor.model).value());
   std::vector<ScanRecord> records;
+  records.reserve(scans.size());
   for (const Scan& scan : scans) records.push_back(*system->Process(scan));
   system->Finish();
   EXPECT_GT(system->GetMapper().Map().Size(), 1000u);
