@@ -26,6 +26,9 @@ REACH_M = 0.4
 SAME_WALL_DEG = 20.0
 MIN_OPACITY = 0.5
 DISC_SIGMAS = 3.0
+# Of ways between two Gaussians' keyframes: those of two passes, and those of one.
+TWO_PASSES_M = (LONG_BEFORE_M, np.inf)
+ONE_PASS_M = (1.0, 10.0)
 
 
 @dataclass(frozen=True)
@@ -111,17 +114,27 @@ def any_near(positions: Array, way_m: Array, k: int) -> bool:
     return bool(near.any())
 
 
-def thickness_m(run: Path) -> Array:
-    """Distances between surfaces that two passes have left of the same wall: of each Gaussian to
-    the disc of another pass that it lies over. Beyond a disc its plane tells nothing: there it
-    meets another surface."""
+@dataclass(frozen=True)
+class Thickness:
+    """Distances between surfaces that a run has left of the same wall."""
+
+    two_passes_m: Array
+    one_pass_m: Array  # as far apart as noise and local drift leave them, whatever loops do
+
+
+def thickness(run: Path) -> Thickness:
     surfels, keyframe = read_surfels(run / "map.ply")
     passes_m = ways_along(Trajectory.read_tum(run / "keyframes_tum.txt").positions)[keyframe]
-    return passes_apart_m(surfels, passes_m)
+    return Thickness(
+        passes_apart_m(surfels, passes_m, TWO_PASSES_M),
+        passes_apart_m(surfels, passes_m, ONE_PASS_M),
+    )
 
 
-def passes_apart_m(surfels: Surfels, passes_m: Array) -> Array:
-    """`passes_m`: on the way of the sensor, where each Gaussian was seen first."""
+def passes_apart_m(surfels: Surfels, passes_m: Array, ways_m: tuple[float, float]) -> Array:
+    """Of each Gaussian to the disc that it lies over of one whose keyframe is `ways_m` away.
+    Beyond a disc its plane tells nothing: there it meets another surface. `passes_m`: on the way of
+    the sensor, where each Gaussian was seen first."""
     kept = (surfels.opacity > MIN_OPACITY) & np.isfinite(surfels.positions).all(1)
     surfels, passes_m = surfels.at(kept), passes_m[kept]
     normals = surfels.axes[:, :, 2]
@@ -129,7 +142,8 @@ def passes_apart_m(surfels: Surfels, passes_m: Array) -> Array:
     found = []
     for i, near in enumerate(tree.query_ball_point(surfels.positions, REACH_M)):
         others = np.array(near)
-        others = others[np.abs(passes_m[others] - passes_m[i]) > LONG_BEFORE_M]
+        way_m = np.abs(passes_m[others] - passes_m[i])
+        others = others[(way_m > ways_m[0]) & (way_m < ways_m[1])]
         others = others[normals[others] @ normals[i] > np.cos(np.radians(SAME_WALL_DEG))]
         if not len(others):
             continue

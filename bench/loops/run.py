@@ -19,13 +19,13 @@ import peers
 import report
 import track_runs
 from covsplat_run import base_command
-from loop_measures import LoopFacts, loop_facts, thickness_m
+from loop_measures import LoopFacts, Thickness, loop_facts, thickness
 from map_runs import strict_f_percent
 from options import add_options, recordings
 from processes import apart, run_program
 from recording import Recording
 from report import number
-from se3 import Trajectory, ways_along
+from se3 import Array, Trajectory, ways_along
 
 HEADER = (
     "recording",
@@ -40,6 +40,7 @@ HEADER = (
     "revisits found",
     "double walls: median mm",
     "90 % mm",
+    "of one pass: median mm",
     "strict F 0.1 m",
     "0.05 m",
 )
@@ -52,7 +53,7 @@ class Row:
     method: str
     ate_m: float
     loops: LoopFacts | None = None
-    double_mm: tuple[float, float] | None = None  # median and 90 %
+    double: Thickness | None = None
     strict_f_percent: tuple[float, float] | None = None  # at 0.1 and 0.05 m
 
 
@@ -114,16 +115,15 @@ def judged(recording: Recording, method: str, run: Path, options: argparse.Names
     row = row_of(recording, method, Trajectory.read_tum(run / "trajectory_tum.txt"))
     closed = run / "loops" if (run / "loops").is_dir() else run
     loops = loop_facts(closed, recording) if (closed / "loops.csv").is_file() else None
-    apart_m = thickness_m(run)
-    double = tuple(1e3 * np.percentile(apart_m, [50, 90])) if len(apart_m) else None
     strict = strict_f_percent(recording, run, options, compared_voxel_m=0.05)
-    return Row(row.recording, row.way_m, method, row.ate_m, loops, double, strict)
+    return Row(row.recording, row.way_m, method, row.ate_m, loops, thickness(run), strict)
 
 
 def cells(row: Row) -> list[str]:
     loops = row.loops or LoopFacts(0, 0)
     known = row.loops is not None
-    double = row.double_mm or (None, None)
+    two_passes_m = row.double.two_passes_m if row.double else np.empty(0)
+    one_pass_m = row.double.one_pass_m if row.double else np.empty(0)
     strict = row.strict_f_percent or (None, None)
     has_truth = known and loops.revisits is not None
     return [
@@ -137,11 +137,16 @@ def cells(row: Row) -> list[str]:
         str(loops.wrong) if has_truth else "-",
         number(None if loops.worst_m is None else 1e3 * loops.worst_m, 1),
         f"{loops.found}/{loops.revisits}" if has_truth else "-",
-        number(double[0], 1),
-        number(double[1], 1),
+        percentile_mm(two_passes_m, 50),
+        percentile_mm(two_passes_m, 90),
+        percentile_mm(one_pass_m, 50),
         number(strict[0], 2),
         number(strict[1], 2),
     ]
+
+
+def percentile_mm(values_m: Array, percent: float) -> str:
+    return number(1e3 * np.percentile(values_m, percent) if len(values_m) else None, 1)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,14 @@ import unittest
 
 import numpy as np
 
-from loop_measures import Surfels, is_wrong, passes_apart_m, revisits_of
+from loop_measures import (
+    ONE_PASS_M,
+    TWO_PASSES_M,
+    Surfels,
+    is_wrong,
+    passes_apart_m,
+    revisits_of,
+)
 
 FIRST_M, SECOND_M = 0.0, 100.0  # of two passes, on the way
 
@@ -28,7 +35,7 @@ def floor(height_m: float, x_m: float = 0.0) -> np.ndarray:
 
 def apart_m(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     passes_m = np.repeat([FIRST_M, SECOND_M], [len(first), len(second)])
-    return passes_apart_m(flat(np.vstack([first, second])), passes_m)
+    return passes_apart_m(flat(np.vstack([first, second])), passes_m, TWO_PASSES_M)
 
 
 class PassesApartTest(unittest.TestCase):
@@ -39,7 +46,10 @@ class PassesApartTest(unittest.TestCase):
 
     def test_what_one_pass_left_is_not_double(self) -> None:
         surfels = flat(np.vstack([floor(0.0), floor(0.013)]))
-        self.assertEqual(len(passes_apart_m(surfels, np.full(800, FIRST_M))), 0)
+        self.assertEqual(len(passes_apart_m(surfels, np.full(800, FIRST_M), TWO_PASSES_M)), 0)
+        passes_m = np.repeat([FIRST_M, FIRST_M + 5.0], 400)
+        self.assertEqual(len(passes_apart_m(surfels, passes_m, TWO_PASSES_M)), 0)
+        np.testing.assert_allclose(passes_apart_m(surfels, passes_m, ONE_PASS_M), 0.013)
 
     def test_a_step_beside_a_floor_is_another_surface(self) -> None:
         self.assertEqual(len(apart_m(floor(0.0), floor(0.05, x_m=3.8 + 0.35))), 0)

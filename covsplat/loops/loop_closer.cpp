@@ -137,18 +137,23 @@ LoopCloser::Ways LoopCloser::WaysFrom(int keyframe) const {
   return ways;
 }
 
-/// The nearest place that may be the newest one.
+/// The nearest place that may be the newest one. One on the same floor, a room away, shows more of
+/// the same than one right below.
 std::optional<LoopCloser::Candidate> LoopCloser::NearestPlace(const Ways& ways) const {
   constexpr double kFarthestReachM = 6.0;
+  constexpr double kHeightCounts = 4.0;
   const SE3& T_map_new = PoseOf(places_.back());
+  const Eigen::Vector3d up = Up();
   std::optional<Candidate> nearest;
   double nearest_m = kUnreached;
   for (std::size_t p = 0; p < places_.size(); ++p) {
     const auto node = static_cast<std::size_t>(places_[p].keyframe);
     if (ways.way_m[node] < config_.search.min_way_m) continue;
     const SE3 T_old_new = PoseOf(places_[p]).Inverse() * T_map_new;
-    const double apart_m = T_old_new.Translation().norm();
-    if (apart_m > config_.search.reach_m + ways.drift_m[node] || apart_m >= nearest_m) continue;
+    if (T_old_new.Translation().norm() > config_.search.reach_m + ways.drift_m[node]) continue;
+    const Eigen::Vector3d apart = PoseOf(places_[p]).Translation() - T_map_new.Translation();
+    const double apart_m = (apart + (kHeightCounts - 1.0) * up.dot(apart) * up).norm();
+    if (apart_m >= nearest_m) continue;
     const double drift_m = ways.drift_m[node] + config_.search.drift_m;
     nearest = {p, LoopHint::kPose, T_old_new, std::min(2.0 * drift_m, kFarthestReachM)};
     nearest_m = apart_m;
@@ -185,6 +190,15 @@ void LoopCloser::AddSection() {
   const DensityImage image = DensityOf(points, config_.looks.cell_m, config_.looks.min_density);
   sections_.push_back({newest, T_ground_place, LandmarksOf(image)});
   way_since_section_m_ = 0.0;
+}
+
+/// Off the ground of the newest section, in the map frame; zero before there is one.
+Eigen::Vector3d LoopCloser::Up() const {
+  if (sections_.empty()) return Eigen::Vector3d::Zero();
+  const Section& section = sections_.back();
+  const Eigen::Quaterniond ground_place = section.T_ground_place.Rotation();
+  return PoseOf(places_[section.place]).Rotation() *
+         (ground_place.inverse() * Eigen::Vector3d::UnitZ());
 }
 
 /// Places on the way before and after one, in its frame.
@@ -232,11 +246,8 @@ bool LoopCloser::IsTooFar(const Candidate& candidate, const LoopRecord& loop) co
   const SE3& T_map_old = PoseOf(places_[candidate.place]);
   const Eigen::Vector3d moved =
       (T_map_old * loop.check.T_old_new).Translation() - PoseOf(places_.back()).Translation();
-  const Eigen::Quaterniond ground_place = sections_.back().T_ground_place.Rotation();
-  const Eigen::Vector3d up =
-      PoseOf(places_.back()).Rotation() * (ground_place.inverse() * Eigen::Vector3d::UnitZ());
   const double far_m = config_.search.drift_m + 0.01 * config_.looks.drift_percent * loop.way_m;
-  return std::abs(up.dot(moved)) > loop.drift_m || moved.norm() > far_m;
+  return std::abs(Up().dot(moved)) > loop.drift_m || moved.norm() > far_m;
 }
 
 /// Whether two loops say the same of the drift between the two ways.

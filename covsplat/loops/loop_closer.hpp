@@ -219,6 +219,7 @@ class LoopCloser {
   std::optional<Candidate> NearestPlace(const Ways& ways) const;
   std::optional<Candidate> MostAlike(const Ways& ways) const;
   void AddSection();
+  Eigen::Vector3d Up() const;
   LocalMap Around(std::size_t place, double back_m, double forth_m) const;
   LoopRecord Check(const Candidate& candidate, const Ways& ways) const;
   bool IsTooFar(const Candidate& candidate, const LoopRecord& loop) const;

@@ -120,5 +120,30 @@ TEST_F(LoopCloserTest, NoLoopIsFarFromWhatOdometryAllows) {
   EXPECT_EQ(corrections_, 0);
 }
 
+TEST_F(LoopCloserTest, APlaceOnTheSameFloorIsLookedAtBeforeOneRightBelow) {
+  constexpr int kLeg = 25;  // keyframes; the same way on two floors, upstairs 8 m aside at first
+  const SE3 upstairs(Eigen::Quaterniond::Identity(), {0.0, 0.0, 3.0});
+  const SE3 aside(Eigen::Quaterniond::Identity(), {0.0, 8.0, 0.0});
+  LoopConfig config;
+  config.search.agree_deg = 0.0;  // no loop is to move anything
+  LoopCloser closer(config, pool_);
+  for (int k = 0; k < 3 * kLeg; ++k) {
+    const SE3 truth = RoundTheBlock(kStepM * (k % kLeg));
+    LoopKeyframe keyframe;
+    keyframe.T_odom_keyframe = k < kLeg       ? truth
+                               : k < 2 * kLeg ? upstairs * truth * aside
+                                              : upstairs * truth;
+    keyframe.place = PlaceAt(city_, k, truth, 1000 + static_cast<std::uint64_t>(k), pool_);
+    closer.Add(std::move(keyframe));
+  }
+  int looked_at = 0;
+  for (const LoopRecord& loop : closer.Loops()) {
+    if (loop.hint != LoopHint::kPose || loop.new_keyframe < 2 * kLeg) continue;
+    EXPECT_GE(loop.old_keyframe, kLeg) << loop.new_keyframe;
+    ++looked_at;
+  }
+  EXPECT_GE(looked_at, 5);
+}
+
 }  // namespace
 }  // namespace covsplat::test
