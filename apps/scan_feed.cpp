@@ -134,8 +134,8 @@ class ReadAheadFeed : public ScanFeed {
 
 class RealtimeFeed : public ScanFeed {
  public:
-  RealtimeFeed(std::unique_ptr<ScanFeed> feed, std::function<bool()> stop)
-      : feed_(std::move(feed)), stop_(std::move(stop)) {}
+  RealtimeFeed(std::unique_ptr<ScanFeed> feed, double rate, std::function<bool()> stop)
+      : feed_(std::move(feed)), rate_(rate), stop_(std::move(stop)) {}
   ~RealtimeFeed() override { thread_ = {}; }  // asks it to stop and joins
 
   std::optional<FedScan> Next() override {
@@ -174,7 +174,7 @@ class RealtimeFeed : public ScanFeed {
         first_stamp_s = fed->scan.stamp_s;
         start = fed->arrival;
       }
-      const std::chrono::duration<double> after(fed->scan.stamp_s - *first_stamp_s);
+      const std::chrono::duration<double> after((fed->scan.stamp_s - *first_stamp_s) / rate_);
       const auto due = start + std::chrono::duration_cast<Clock::duration>(after);
       while (Clock::now() < due && !token.stop_requested()) {
         std::this_thread::sleep_until(std::min(due, Clock::now() + kPatience));
@@ -204,6 +204,7 @@ class RealtimeFeed : public ScanFeed {
   }
 
   const std::unique_ptr<ScanFeed> feed_;  // of the thread
+  const double rate_;
   const std::function<bool()> stop_;
   std::mutex mutex_;
   std::condition_variable news_;
@@ -232,8 +233,9 @@ std::unique_ptr<ScanFeed> MakeReadAheadFeed(std::unique_ptr<ScanFeed> feed,
 }
 
 std::unique_ptr<ScanFeed> MakeRealtimeFeed(std::unique_ptr<ScanFeed> feed,
+                                           double rate,
                                            std::function<bool()> stop) {
-  return std::make_unique<RealtimeFeed>(std::move(feed), std::move(stop));
+  return std::make_unique<RealtimeFeed>(std::move(feed), rate, std::move(stop));
 }
 
 }  // namespace covsplat

@@ -61,9 +61,10 @@ std::unique_ptr<ScanFeed> MakeReadAheadFeed(std::unique_ptr<ScanFeed> feed,
 /// not far behind.
 inline constexpr std::size_t kMaxWaitingScans = 2;
 
-/// The scans of another feed at the times of their stamps, from the first call on. The newest
-/// kMaxWaitingScans wait; older ones are dropped.
+/// The scans of another feed at the times of their stamps, from the first call on, `rate` times as
+/// fast. The newest kMaxWaitingScans wait; older ones are dropped.
 std::unique_ptr<ScanFeed> MakeRealtimeFeed(std::unique_ptr<ScanFeed> feed,
+                                           double rate,
                                            std::function<bool()> stop);
 
 }  // namespace covsplat

@@ -50,7 +50,9 @@ Result<Prepared> Prepare(RunRequest& request) {
   run.scans = ((*source)->ScanCount() + request.jump - 1) / request.jump;
   run.feed = MakeFeed(std::move(*source), request.jump, Interrupted);
   run.feed = MakeReadAheadFeed(std::move(run.feed), Interrupted);
-  if (request.realtime) run.feed = MakeRealtimeFeed(std::move(run.feed), Interrupted);
+  if (request.realtime_rate > 0.0) {
+    run.feed = MakeRealtimeFeed(std::move(run.feed), request.realtime_rate, Interrupted);
+  }
 
   auto truth = LoadTruth(request.recording, request.truth, request.config.input.scan_period_s);
   if (!truth) return Forward(truth);

@@ -19,7 +19,8 @@ struct RunRequest {
   std::int64_t first_scan = 0;
   std::int64_t max_scans = -1;  ///< to track; -1: all
   std::int64_t jump = 1;        ///< track every n-th scan
-  bool realtime = false;
+  double realtime_rate =
+      0.0;  ///< feed scans so many times as fast as they came; 0: as fast as can be
   bool quiet = false;
   std::optional<std::filesystem::path> truth;  ///< trajectory to evaluate against
   std::optional<std::filesystem::path> poses;  ///< trajectory to map with instead of tracking

@@ -21,7 +21,11 @@ void AddInputFlags(CLI::App& command, RunOptions& o) {
       ->type_name("FILE");
   command.add_option("--poses", o.poses, "Map with these poses instead of tracking")
       ->type_name("FILE");
-  command.add_flag("--realtime", o.realtime, "Feed scans at the times of their stamps");
+  CLI::Option* realtime =
+      command.add_flag("--realtime", o.realtime, "Feed scans at the times of their stamps");
+  command.add_option("--rate", o.rate, "... so many times as fast")
+      ->check(CLI::Range(0.01, 100.0))
+      ->needs(realtime);
 }
 
 }  // namespace
@@ -66,7 +70,7 @@ Result<RunRequest> RequestOf(const RunOptions& o) {
   request.first_scan = o.first;
   if (o.scans > 0) request.max_scans = o.scans;
   request.jump = o.jump;
-  request.realtime = o.realtime;
+  if (o.realtime) request.realtime_rate = o.rate;
   request.quiet = o.quiet;
   if (!o.truth.empty()) request.truth = o.truth;
   if (!o.poses.empty()) request.poses = o.poses;

@@ -20,6 +20,7 @@ struct RunOptions {
   std::string loops;
   bool deterministic = false;
   bool realtime = false;
+  double rate = 1.0;
   bool quiet = false;
   std::string truth;
   std::string poses;

@@ -49,11 +49,7 @@ HEADER = (
     "max",
     "peak MiB",
 )
-RUNS = {
-    "covsplat, real time": ("--realtime",),
-    "covsplat, full speed": (),
-    "covsplat, lockstep": ("--deterministic",),
-}
+FAST_HZ = 20.0
 
 
 @dataclass(frozen=True)
@@ -93,7 +89,14 @@ def parse() -> argparse.Namespace:
 
 
 def runs_of(recording: Recording, options: argparse.Namespace) -> dict:
-    runs = {name: partial(covsplat, recording, name, options) for name in RUNS}
+    rate = FAST_HZ * float(np.median(np.diff(recording.stamps_s)))
+    flags = {
+        "covsplat, real time": ["--realtime"],
+        f"covsplat, {FAST_HZ:.0f} scans per s": ["--realtime", "--rate", f"{rate:.3f}"],
+        "covsplat, full speed": [],
+        "covsplat, lockstep": ["--deterministic"],
+    }
+    runs = {name: partial(covsplat, recording, name, flags[name], options) for name in flags}
     trackers = {
         "KISS-ICP": partial(peers.run_kiss_icp, recording, options.threads),
         "small_gicp G-ICP": partial(
@@ -105,11 +108,13 @@ def runs_of(recording: Recording, options: argparse.Namespace) -> dict:
     return runs
 
 
-def covsplat(recording: Recording, name: str, options: argparse.Namespace) -> Row:
+def covsplat(
+    recording: Recording, name: str, flags: list[str], options: argparse.Namespace
+) -> Row:
     out = options.out / recording.name / name.replace(", ", "_").replace(" ", "_")
     out.parent.mkdir(parents=True, exist_ok=True)
     command = base_command(options.covsplat, recording, out, options.threads)
-    run_program([*command, "--quiet", *RUNS[name]])
+    run_program([*command, "--quiet", *flags])
     metrics = json.loads((out / "metrics.json").read_text())
     return Row(
         recording.name,

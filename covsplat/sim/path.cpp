@@ -11,6 +11,24 @@ namespace {
 
 constexpr int kSamplesPerControl = 200;
 
+Eigen::Vector3d OnTheGround(const Eigen::Vector2d& point) { return {point.x(), point.y(), 0.0}; }
+
+// From the end of a straight that goes `along`, a quarter turn towards `aside`.
+void AppendArc(const Eigen::Vector2d& from,
+               const Eigen::Vector2d& along,
+               const Eigen::Vector2d& aside,
+               double radius_m,
+               double spacing_m,
+               std::vector<Eigen::Vector3d>& controls) {
+  const double quarter_m = 0.5 * std::numbers::pi * radius_m;
+  const int steps = std::max(1, static_cast<int>(std::ceil(quarter_m / spacing_m)));
+  for (int k = 0; k < steps; ++k) {
+    const double turn = 0.5 * std::numbers::pi * k / steps;
+    controls.push_back(
+        OnTheGround(from + radius_m * (std::sin(turn) * along + (1.0 - std::cos(turn)) * aside)));
+  }
+}
+
 }  // namespace
 
 std::vector<Eigen::Vector3d> AlongLines(const std::vector<Eigen::Vector3d>& corners,
@@ -25,6 +43,32 @@ std::vector<Eigen::Vector3d> AlongLines(const std::vector<Eigen::Vector3d>& corn
     for (int k = 0; k < steps; ++k) controls.push_back(from + line * k / steps);
   }
   if (!closed) controls.push_back(corners.back());
+  return controls;
+}
+
+std::vector<Eigen::Vector3d> AlongStreets(const std::vector<Eigen::Vector2d>& corners,
+                                          bool closed,
+                                          double radius_m,
+                                          double spacing_m) {
+  std::vector<Eigen::Vector3d> controls;
+  const std::size_t n = corners.size();
+  const std::size_t sides = closed ? n : n - 1;
+  const auto along = [&](std::size_t side) -> Eigen::Vector2d {
+    return (corners[(side + 1) % n] - corners[side % n]).normalized();
+  };
+  for (std::size_t side = 0; side < sides; ++side) {
+    const bool bends_before = closed || side > 0;
+    const bool bends_after = closed || side + 1 < sides;
+    const Eigen::Vector2d from = corners[side] + (bends_before ? radius_m : 0.0) * along(side);
+    const Eigen::Vector2d to =
+        corners[(side + 1) % n] - (bends_after ? radius_m : 0.0) * along(side);
+    const int steps = static_cast<int>(std::ceil((to - from).norm() / spacing_m));
+    for (int k = 0; k < steps; ++k) {
+      controls.push_back(OnTheGround(from + (to - from) * k / steps));
+    }
+    if (bends_after) AppendArc(to, along(side), along(side + 1), radius_m, spacing_m, controls);
+  }
+  if (!closed) controls.push_back(OnTheGround(corners.back()));
   return controls;
 }
 

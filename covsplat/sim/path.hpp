@@ -43,6 +43,13 @@ std::vector<Eigen::Vector3d> AlongLines(const std::vector<Eigen::Vector3d>& corn
                                         bool closed,
                                         double spacing_m);
 
+/// Control points every `spacing_m` or less along straight lines between corners, each a quarter
+/// turn to either side, and along arcs of `radius_m` round the corners.
+std::vector<Eigen::Vector3d> AlongStreets(const std::vector<Eigen::Vector2d>& corners,
+                                          bool closed,
+                                          double radius_m,
+                                          double spacing_m);
+
 /// The control points of a route, each moved in the plane by up to `jitter_m` per axis.
 std::vector<Eigen::Vector3d> Jittered(const Route& route, Rng& rng);
 

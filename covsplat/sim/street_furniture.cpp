@@ -3,13 +3,15 @@
 #include <cmath>
 #include <numbers>
 
+#include "covsplat/sim/path.hpp"
 #include "covsplat/sim/props.hpp"
-#include "covsplat/sim/street.hpp"
+#include "covsplat/sim/street_plan.hpp"
 #include "covsplat/sim/street_props.hpp"
 
 namespace covsplat {
 namespace {
 
+using Eigen::Vector2d;
 using Eigen::Vector3f;
 using P = StreetPlan;
 
@@ -18,7 +20,7 @@ constexpr double kQuarter = 0.5 * std::numbers::pi;
 // A line along the ring at which things stand.
 class Verge {
  public:
-  explicit Verge(double offset_m) : path_(StreetRing(offset_m, 0.5), true) {}
+  Verge(const Vector2d& origin, double offset_m) : path_(StreetRing(origin, offset_m, 0.5), true) {}
 
   double Length() const { return path_.Length(); }
 
@@ -40,8 +42,8 @@ class Verge {
   Path path_;
 };
 
-void AddTrees(MeshBuilder& mesh, double side, Rng& rng) {
-  const Verge verge(side * 6.4);
+void AddTrees(MeshBuilder& mesh, const Vector2d& origin, double side, Rng& rng) {
+  const Verge verge(origin, side * 6.4);
   for (double at = rng.Uniform(4.0, 12.0); at < verge.Length(); at += rng.Uniform(17.0, 26.0)) {
     const auto height = static_cast<float>(rng.Uniform(5.5, 8.0));
     const auto crown = static_cast<float>(rng.Uniform(1.5, 2.2));
@@ -49,8 +51,8 @@ void AddTrees(MeshBuilder& mesh, double side, Rng& rng) {
   }
 }
 
-void AddParkedCars(MeshBuilder& mesh, double side, Rng& rng) {
-  const Verge bays(side * static_cast<double>(P::kParked));
+void AddParkedCars(MeshBuilder& mesh, const Vector2d& origin, double side, Rng& rng) {
+  const Verge bays(origin, side * static_cast<double>(P::kParked));
   for (double at = 3.0; at < bays.Length(); at += 6.0) {
     const double where = at + rng.Uniform(-0.3, 0.3);
     const float yaw = bays.Heading(where) + static_cast<float>(rng.Uniform(-0.03, 0.03)) +
@@ -61,8 +63,8 @@ void AddParkedCars(MeshBuilder& mesh, double side, Rng& rng) {
   }
 }
 
-void AddSmallThings(MeshBuilder& mesh, double side, Rng& rng) {
-  const Verge verge(side * 5.95);
+void AddSmallThings(MeshBuilder& mesh, const Vector2d& origin, double side, Rng& rng) {
+  const Verge verge(origin, side * 5.95);
   const float facing = static_cast<float>(side * kQuarter);  // to the road, from the heading
   int number = 0;
   for (double at = 9.0; at < verge.Length(); at += rng.Uniform(8.0, 13.0), ++number) {
@@ -86,7 +88,7 @@ void AddSmallThings(MeshBuilder& mesh, double side, Rng& rng) {
         mesh.Box(base, {0.9f, 0.4f, 1.3f}, yaw, 0.3f);  // a switch box
     }
   }
-  const Verge back(side * 6.8);
+  const Verge back(origin, side * 6.8);
   for (double at = 45.0; at < back.Length(); at += rng.Uniform(70.0, 110.0)) {
     if (!back.IsStraight(at, 8.0)) continue;
     const Vector3f base = back.At(at, P::kKerbHeight);
@@ -100,12 +102,10 @@ void AddSmallThings(MeshBuilder& mesh, double side, Rng& rng) {
 
 }  // namespace
 
-void AddStreetFurniture(MeshBuilder& mesh, Rng& rng) {
-  for (const double side : {1.0, -1.0}) {
-    AddTrees(mesh, side, rng);
-    AddParkedCars(mesh, side, rng);
-    AddSmallThings(mesh, side, rng);
-  }
+void AddStreetFurniture(MeshBuilder& mesh, const Vector2d& origin, double side, Rng& rng) {
+  AddTrees(mesh, origin, side, rng);
+  AddParkedCars(mesh, origin, side, rng);
+  AddSmallThings(mesh, origin, side, rng);
 }
 
 }  // namespace covsplat

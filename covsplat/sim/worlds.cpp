@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "covsplat/sim/city.hpp"
 #include "covsplat/sim/college.hpp"
 #include "covsplat/sim/courtyard.hpp"
 #include "covsplat/sim/multilevel.hpp"
@@ -32,6 +33,12 @@ constexpr std::array kWorlds = {
               MakeStreet,
               StreetRoute,
               StreetTraffic},
+    WorldKind{"city",
+              "10 km through a grid of streets: people, parked cars, trees; revisits",
+              "vehicle",
+              [](int seed) { return MakeCity(seed); },
+              [] { return CityRoute(); },
+              [](int seed) { return CityPeople(seed); }},
     WorldKind{"tunnel",
               "220 m of smooth tunnel between two portals; degenerate along its axis",
               "vehicle",

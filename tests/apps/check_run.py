@@ -300,6 +300,7 @@ def broken_runs_are_input_errors_that_name_the_file(bench):
 @case
 def wrong_requests_are_usage_errors(bench):
     expect(bench.run(bench.good, "x", "--nonsense"), 2, err="--nonsense")
+    expect(bench.run(bench.good, "x", "--rate", "2"), 2, err="--realtime")
     expect(bench.run(bench.good, "x", "-s", "gicp.max_iteration=3"), 2, err="gicp.max_iterations")
     expect(bench.run(bench.good, "x", "-s", "keyframe.min_overlap=7"), 2, err="0 to 1")
     expect(bench.run(bench.good, "x", "--format", "las"), 2, err="kitti")

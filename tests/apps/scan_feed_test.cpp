@@ -127,7 +127,7 @@ TEST(ScanFeedTest, ReadAheadStops) {
 }
 
 TEST(ScanFeedTest, RealtimeKeepsTheNewestScansAndCountsTheOthers) {
-  const auto feed = MakeRealtimeFeed(FeedOf(EvenStamps(40, 0.01)), [] { return false; });
+  const auto feed = MakeRealtimeFeed(FeedOf(EvenStamps(40, 0.01)), 1.0, [] { return false; });
   const auto start = std::chrono::steady_clock::now();
   std::vector<std::int64_t> scans;
   while (const auto fed = feed->Next()) {
@@ -145,7 +145,7 @@ TEST(ScanFeedTest, RealtimeKeepsTheNewestScansAndCountsTheOthers) {
 }
 
 TEST(ScanFeedTest, RealtimeScansArriveAtTheTimesOfTheirStampsHoweverLateTheyAreTaken) {
-  const auto feed = MakeRealtimeFeed(FeedOf({5.0, 5.01, 5.02, 5.04}), [] { return false; });
+  const auto feed = MakeRealtimeFeed(FeedOf({5.0, 5.01, 5.02, 5.04}), 1.0, [] { return false; });
   std::vector<std::chrono::steady_clock::time_point> arrivals;
   while (const auto fed = feed->Next()) {
     arrivals.push_back(fed->arrival);
@@ -161,8 +161,17 @@ TEST(ScanFeedTest, RealtimeScansArriveAtTheTimesOfTheirStampsHoweverLateTheyAreT
   EXPECT_EQ(feed->Counts().dropped, 1);
 }
 
+TEST(ScanFeedTest, AFasterRateBringsScansEarlier) {
+  const auto feed = MakeRealtimeFeed(FeedOf({5.0, 5.04, 5.1}), 2.0, [] { return false; });
+  std::vector<std::chrono::steady_clock::time_point> arrivals;
+  while (const auto fed = feed->Next()) arrivals.push_back(fed->arrival);
+  ASSERT_EQ(arrivals.size(), 3u);
+  EXPECT_NEAR(std::chrono::duration<double>(arrivals[1] - arrivals[0]).count(), 0.02, 1e-6);
+  EXPECT_NEAR(std::chrono::duration<double>(arrivals[2] - arrivals[0]).count(), 0.05, 1e-6);
+}
+
 TEST(ScanFeedTest, RealtimeCanBeAbandoned) {
-  const auto feed = MakeRealtimeFeed(FeedOf({0.0, 1000.0}), [] { return false; });
+  const auto feed = MakeRealtimeFeed(FeedOf({0.0, 1000.0}), 1.0, [] { return false; });
   EXPECT_TRUE(feed->Next());
 }
 
