@@ -28,10 +28,10 @@ void GaussianMap::Append(int keyframe, const SpawnedGaussians& fresh) {
   std::ranges::copy(fresh.signals, signals_.begin() + static_cast<std::ptrdiff_t>(begin));
 }
 
-void GaussianMap::MarkSeen(int keyframe_number,
-                           const Keyframe& keyframe,
-                           const SensorModel& sensor,
-                           int max_age) {
+std::vector<std::size_t> GaussianMap::MarkSeen(int keyframe_number,
+                                               const Keyframe& keyframe,
+                                               const SensorModel& sensor,
+                                               int max_age) {
   constexpr double kLiesAsItDid = 0.95;
   constexpr float kSameSurfaceM = 0.1f;
   const int oldest_known = keyframe_number - max_age;
@@ -71,38 +71,29 @@ void GaussianMap::MarkSeen(int keyframe_number,
     signals_[i].last_seen = keyframe_number;
     signals_[i].seen_through = 0;
   }
-}
-
-/// Removes the rows that f(row) names; returns how many.
-template <class F>
-std::size_t GaussianMap::RemoveIf(F&& f) {
-  std::vector<std::uint8_t> keep(engine_->Gaussians().Size(), 0);
-  std::size_t removed = 0;
-  for (const AnchorRange& range : engine_->Ranges()) {
-    for (std::size_t i = range.begin; i < range.end; ++i) {
-      keep[i] = f(i) ? 0 : 1;
-      removed += keep[i] == 0;
-    }
-  }
-  if (removed == 0) return 0;
-  const std::vector<std::size_t> old_row = engine_->Keep(keep);
-  GatherRows(old_row, signals_);
-  as_spawned_.Gather(old_row);
-  return removed;
+  return through;
 }
 
 std::size_t GaussianMap::PruneOpacity(double min_opacity) {
   const auto min_logit = static_cast<float>(std::log(min_opacity / (1.0 - min_opacity)));
   const GaussianColumns<float>& table = engine_->Gaussians();
-  return RemoveIf([&](std::size_t i) {
-    bool finite = true;
-    for (int p = 0; p < kParameterCount; ++p) finite &= std::isfinite(table.Column(p)[i]);
-    return !finite || table.Column(kOpacityLogit)[i] < min_logit;
-  });
+  std::vector<std::size_t> gone;
+  for (const AnchorRange& range : engine_->Ranges()) {
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      bool finite = true;
+      for (int p = 0; p < kParameterCount; ++p) finite &= std::isfinite(table.Column(p)[i]);
+      if (!finite || table.Column(kOpacityLogit)[i] < min_logit) gone.push_back(i);
+    }
+  }
+  return Remove(gone);
 }
 
-std::size_t GaussianMap::PruneSeenThrough(int keyframes) {
-  return RemoveIf([&](std::size_t i) { return signals_[i].seen_through >= keyframes; });
+std::size_t GaussianMap::PruneSeenThrough(std::span<const std::size_t> rows, int keyframes) {
+  std::vector<std::size_t> gone;
+  for (const std::size_t i : rows) {
+    if (signals_[i].seen_through >= keyframes) gone.push_back(i);
+  }
+  return Remove(gone);
 }
 
 NearGaussians GaussianMap::Near(const SE3& T_map_sensor, double distance_m) const {
@@ -132,9 +123,14 @@ NearGaussians GaussianMap::Near(const SE3& T_map_sensor, double distance_m) cons
 }
 
 std::size_t GaussianMap::Remove(std::span<const std::size_t> rows) {
-  std::vector<std::uint8_t> goes(engine_->Gaussians().Size(), 0);
-  for (const std::size_t i : rows) goes[i] = 1;
-  return RemoveIf([&](std::size_t i) { return goes[i] != 0; });
+  if (rows.empty()) return 0;
+  const std::size_t before = Size();
+  std::vector<std::uint8_t> keep(engine_->Gaussians().Size(), 1);
+  for (const std::size_t i : rows) keep[i] = 0;
+  const RowMoves moves = engine_->Keep(keep);
+  MoveRows(moves, signals_);
+  as_spawned_.Move(moves);
+  return before - Size();
 }
 
 std::size_t GaussianMap::Bytes() const {

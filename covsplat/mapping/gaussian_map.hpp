@@ -32,15 +32,17 @@ class GaussianMap {
   /// only where they lie on the surface that is measured, or tracking would be torn between them
   /// and newer ones, and count as seen through only if nearly all of the map that is so old is
   /// where it was.
-  void MarkSeen(int keyframe_number,
-                const Keyframe& keyframe,
-                const SensorModel& sensor,
-                int max_age);
+  /// Returns the rows of the engine's table that it has seen through.
+  std::vector<std::size_t> MarkSeen(int keyframe_number,
+                                    const Keyframe& keyframe,
+                                    const SensorModel& sensor,
+                                    int max_age);
 
   /// Removes Gaussians below an opacity (or no longer finite); returns how many went.
   std::size_t PruneOpacity(double min_opacity);
-  /// Removes Gaussians that so many keyframes have seen through: what they show has moved on.
-  std::size_t PruneSeenThrough(int keyframes);
+  /// Removes those of some rows that so many keyframes have seen through: what they show has moved
+  /// on.
+  std::size_t PruneSeenThrough(std::span<const std::size_t> rows, int keyframes);
 
   /// Gaussians whose means are within a distance of a pose, in its frame; none that is not finite.
   NearGaussians Near(const SE3& T_map_sensor, double distance_m) const;
@@ -64,9 +66,6 @@ class GaussianMap {
   const GaussianColumns<float>& AsSpawned() const { return as_spawned_; }
 
  private:
-  template <class F>
-  std::size_t RemoveIf(F&& f);
-
   std::unique_ptr<SplatEngine> engine_;
   std::vector<GaussianSignals> signals_;
   GaussianColumns<float> as_spawned_;

@@ -91,8 +91,9 @@ void Mapper::Spawn(const Keyframe& keyframe) {
       SpawnGaussians(keyframe, fit, render ? &*render : nullptr, staying, sensor_, config_.spawn);
   const int number = map_.AddKeyframe(keyframe, spawned);
   views_.Add(number);
-  map_.MarkSeen(number, keyframe, sensor_, config_.feedback.max_keyframe_age);
-  map_.PruneSeenThrough(config_.manage.prune_seen_through);
+  const std::vector<std::size_t> through =
+      map_.MarkSeen(number, keyframe, sensor_, config_.feedback.max_keyframe_age);
+  map_.PruneSeenThrough(through, config_.manage.prune_seen_through);
 }
 
 void Mapper::Manage() {

@@ -155,72 +155,105 @@ void FitCells(std::span<const PointCell> cells,
   });
 }
 
-/// The square that a disc stands for, a little within its edges.
+/// The square that a disc stands for, in the frame of the grid.
 struct Square {
   Eigen::Vector3f middle;
-  Eigen::Vector3f u;  ///< to the middles of its edges
-  Eigen::Vector3f v;
+  Eigen::Matrix3f axes;  ///< columns: along its edges, normal
+  Eigen::Vector3f half;  ///< of its sides, and of a little thickness
 
-  Eigen::AlignedBox3f Box(const Eigen::Vector3f& margin) const {
-    const Eigen::Vector3f reach = u.cwiseAbs() + v.cwiseAbs() + margin;
+  Eigen::AlignedBox3f Box() const {
+    const Eigen::Vector3f reach = axes.cwiseAbs() * half;
     return {middle - reach, middle + reach};
   }
 };
 
+/// A disc also passes through cells on either side that are close to it, but not through those that
+/// its edges hardly reach.
 Square SquareOf(const Disc& disc, double edge_sigmas, float finest_m) {
   constexpr float kMaxEdgeM = 5.0f;  // maps have none that large; one would take forever
-  const auto within = [&](const Eigen::Vector3f& axis) -> Eigen::Vector3f {
+  const auto half = [&](const Eigen::Vector3f& axis) {
     const float length = static_cast<float>(edge_sigmas) * axis.norm() - 0.25f * finest_m;
-    return axis.normalized() * std::clamp(length, 0.0f, kMaxEdgeM);
+    return std::clamp(length, 0.0f, kMaxEdgeM);
   };
-  return {disc.mean, within(disc.u), within(disc.v)};
+  Square square;
+  square.middle = disc.mean;
+  square.axes << disc.u.normalized(), disc.v.normalized(), disc.u.cross(disc.v).normalized();
+  square.half << half(disc.u), half(disc.v), 0.15f * finest_m;
+  return square;
 }
 
-/// Calls f(position) at steps of less than a finest cell over a square.
-template <class F>
-void ForPlacesOf(const Square& square, float finest_m, F&& f) {
-  const auto steps_u = static_cast<int>(std::round(square.u.norm() / (0.7f * finest_m)));
-  const auto steps_v = static_cast<int>(std::round(square.v.norm() / (0.7f * finest_m)));
-  const Eigen::Vector3f step_u = square.u / static_cast<float>(std::max(1, steps_u));
-  const Eigen::Vector3f step_v = square.v / static_cast<float>(std::max(1, steps_v));
-  for (int i = -steps_u; i <= steps_u; ++i) {
-    const Eigen::Vector3f row = square.middle + static_cast<float>(i) * step_u;
-    for (int j = -steps_v; j <= steps_v; ++j) f(row + static_cast<float>(j) * step_v);
+/// Whether a square and a cell lie apart along an axis of the square (of the separating axes of two
+/// boxes those that matter).
+bool Meets(const Square& square, const Eigen::Vector3f& cell_middle, float half_cell) {
+  const Eigen::Vector3f apart = square.axes.transpose() * (cell_middle - square.middle);
+  const Eigen::Vector3f reach =
+      square.half + half_cell * square.axes.cwiseAbs().colwise().sum().transpose();
+  return (apart.cwiseAbs().array() <= reach.array()).all();
+}
+
+/// [block] indices of squares, ascending.
+using SquaresOfBlocks = std::vector<std::vector<int>>;
+
+SquaresOfBlocks SortIntoBlocks(std::span<const Square> squares,
+                               const PointGrid& grid,
+                               ThreadPool& pool) {
+  struct Meeting {
+    std::size_t block;
+    int square;
+  };
+  constexpr std::size_t kChunk = 1024;
+  std::vector<std::vector<Meeting>> meetings((squares.size() + kChunk - 1) / kChunk);
+  ParallelFor(pool, squares.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      grid.ForBlocksIn(squares[i].Box(), [&](std::size_t block) {
+        const auto half_m = 0.5 * grid.CellSize(0);
+        const Eigen::Vector3d middle = grid.Corner(block) + Eigen::Vector3d::Constant(half_m);
+        if (!Meets(squares[i], middle.cast<float>(), static_cast<float>(half_m))) return;
+        meetings[begin / kChunk].push_back({block, static_cast<int>(i)});
+      });
+    }
+  });
+  SquaresOfBlocks of_blocks(grid.Blocks());
+  for (const std::vector<Meeting>& some : meetings) {
+    for (const Meeting& meeting : some) of_blocks[meeting.block].push_back(meeting.square);
   }
+  return of_blocks;
 }
 
 /// [block][code] indices of discs, or none.
 using DiscsOfCells = std::vector<std::vector<int>>;
 
-/// The densest of the discs that pass through each cell.
+/// The densest of the discs that pass through each cell that holds measurements.
 DiscsOfCells DensestDiscs(std::span<const Disc> discs_grid,
                           const PointGrid& grid,
-                          double extent_factor) {
-  DiscsOfCells densest(grid.Blocks(),
-                       std::vector<int>(static_cast<std::size_t>(grid.CellsPerBlock()), kNone));
+                          double extent_factor,
+                          ThreadPool& pool) {
+  constexpr float kInsideCell = 0.75f;  // a corner that is touched is not passed through
   const auto finest_m = static_cast<float>(grid.CellSize(grid.Levels()));
-  for (std::size_t i = 0; i < discs_grid.size(); ++i) {
-    const Disc& disc = discs_grid[i];
-    // A disc also passes through cells on either side that are close to it.
-    const Eigen::Vector3f off = 0.15f * finest_m * disc.u.cross(disc.v).normalized();
-    const Square square = SquareOf(disc, kEdgeSigmas / extent_factor, finest_m);
-    if (!grid.HoldsAnyIn(square.Box(off.cwiseAbs()))) continue;
-    PointGrid::Finder finder(grid);
-    const auto mark = [&](const Eigen::Vector3f& p) {
-      const std::optional<PointGrid::Place> place = finder.FindNew(p);
-      if (!place) return;
-      int& known = densest[place->block][static_cast<std::size_t>(place->code)];
-      const bool is_denser =
-          known == kNone || disc.density > discs_grid[static_cast<std::size_t>(known)].density;
-      if (is_denser) known = static_cast<int>(i);
-    };
-    ForPlacesOf(square, finest_m, [&](const Eigen::Vector3f& p) {
-      mark(p);
-      if (grid.IsWithinCell(p, off.cwiseAbs())) return;
-      mark(p - off);
-      mark(p + off);
-    });
+  std::vector<Square> squares;
+  squares.reserve(discs_grid.size());
+  for (const Disc& disc : discs_grid) {
+    squares.push_back(SquareOf(disc, kEdgeSigmas / extent_factor, finest_m));
   }
+  const SquaresOfBlocks squares_of = SortIntoBlocks(squares, grid, pool);
+  DiscsOfCells densest(grid.Blocks());
+  ParallelFor(pool, grid.Blocks(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) {
+      densest[b].assign(static_cast<std::size_t>(grid.CellsPerBlock()), kNone);
+      for (const PointCell& cell : grid.Cells(b)) {
+        const Eigen::Vector3f middle = grid.MiddleOf(b, cell.code).cast<float>();
+        int& known = densest[b][static_cast<std::size_t>(cell.code)];
+        for (const int i : squares_of[b]) {
+          const float density = discs_grid[static_cast<std::size_t>(i)].density;
+          const bool is_denser =
+              known == kNone || density > discs_grid[static_cast<std::size_t>(known)].density;
+          if (!is_denser) continue;
+          const Square& square = squares[static_cast<std::size_t>(i)];
+          if (Meets(square, middle, 0.5f * kInsideCell * finest_m)) known = i;
+        }
+      }
+    }
+  });
   return densest;
 }
 
@@ -288,7 +321,7 @@ PatchFit FitPatches(std::span<const PosedPoints> scans,
   const PointGrid grid(scans, sensor, config.cell_m, config.levels, pool);
   const SE3 T_grid_sensor = grid.FromMap() * scans.back().T_map_sensor;
   const std::vector<Disc> discs_grid = Moved(T_grid_sensor, known);
-  const DiscsOfCells densest = DensestDiscs(discs_grid, grid, config.extent_factor);
+  const DiscsOfCells densest = DensestDiscs(discs_grid, grid, config.extent_factor, pool);
   const FitJob job = MakeJob(grid, discs_grid, config);
   std::vector<BlockFit> fits(grid.Blocks());
   ParallelFor(pool, grid.Blocks(), 64, [&](std::size_t begin, std::size_t end) {

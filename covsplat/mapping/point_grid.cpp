@@ -167,39 +167,19 @@ std::vector<PointCell> PointGrid::CellsOf(const Sorted& sorted, std::size_t bloc
   return cells;
 }
 
+Eigen::Vector3d PointGrid::MiddleOf(std::size_t block, int code) const {
+  Eigen::Vector3d cell = Eigen::Vector3d::Zero();
+  for (int bit = 0; bit < levels_; ++bit) {
+    for (int axis = 0; axis < 3; ++axis) cell[axis] += (code >> (3 * bit + axis) & 1) << bit;
+  }
+  return Corner(block) + CellSize(levels_) * (cell.array() + 0.5).matrix();
+}
+
 std::optional<PointGrid::Place> PointGrid::Find(const Eigen::Vector3f& p_grid) const {
-  return Finder(*this).FindNew(p_grid);
-}
-
-bool PointGrid::HoldsAnyIn(const Eigen::AlignedBox3f& box_grid) const {
-  const Eigen::Vector3i first = BlockOf(FinestCellOf(box_grid.min()));
-  const Eigen::Vector3i last = BlockOf(FinestCellOf(box_grid.max()));
-  for (int x = first.x(); x <= last.x(); ++x) {
-    for (int y = first.y(); y <= last.y(); ++y) {
-      for (int z = first.z(); z <= last.z(); ++z) {
-        if (block_at_.Find({x, y, z}) >= 0) return true;
-      }
-    }
-  }
-  return false;
-}
-
-bool PointGrid::IsWithinCell(const Eigen::Vector3f& p_grid, const Eigen::Vector3f& margin_m) const {
-  const Eigen::Array3f in_cells = finest_per_m_ * p_grid.array();
-  const Eigen::Array3f inside = in_cells - CellOf(in_cells).cast<float>().array();
-  const Eigen::Array3f margin = finest_per_m_ * margin_m.array();
-  return (inside >= margin).all() && (inside + margin < 1.0f).all();
-}
-
-std::optional<PointGrid::Place> PointGrid::Finder::Enter(const Eigen::Vector3i& finest_cell) {
-  finest_cell_ = finest_cell;
-  const Eigen::Vector3i block_index = grid_.BlockOf(finest_cell);
-  if (block_index != block_index_) {
-    block_index_ = block_index;
-    block_ = grid_.block_at_.Find(block_index);
-  }
-  if (block_ < 0) return std::nullopt;
-  return Place{static_cast<std::size_t>(block_), grid_.CodeOf(finest_cell)};
+  const Eigen::Vector3i finest_cell = FinestCellOf(p_grid);
+  const int block = block_at_.Find(BlockOf(finest_cell));
+  if (block < 0) return std::nullopt;
+  return Place{static_cast<std::size_t>(block), CodeOf(finest_cell)};
 }
 
 }  // namespace covsplat

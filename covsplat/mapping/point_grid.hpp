@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -75,17 +74,15 @@ class PointGrid {
     return block_m_ * index_of_[block].cast<double>();
   }
 
+  /// Of a finest cell.
+  Eigen::Vector3d MiddleOf(std::size_t block, int code) const;
+
   /// Nothing where no block holds measurements. The position has to be finite.
   std::optional<Place> Find(const Eigen::Vector3f& p_grid) const;
 
-  /// Whether any block that a box reaches into holds measurements.
-  bool HoldsAnyIn(const Eigen::AlignedBox3f& box_grid) const;
-
-  /// Whether everything within a margin of a position, axis by axis, is in the same finest cell.
-  bool IsWithinCell(const Eigen::Vector3f& p_grid, const Eigen::Vector3f& margin_m) const;
-
-  /// Finds one position after the other; cheap where they are mostly in the same block.
-  class Finder;
+  /// Calls f(block) for each one with measurements that a box reaches into.
+  template <class F>
+  void ForBlocksIn(const Eigen::AlignedBox3f& box_grid, F&& f) const;
 
  private:
   struct Sorted;
@@ -107,24 +104,18 @@ class PointGrid {
   std::vector<std::vector<PointCell>> cells_;  ///< [B] by code
 };
 
-class PointGrid::Finder {
- public:
-  explicit Finder(const PointGrid& grid) : grid_(grid) {}
-
-  /// As the grid's Find, but says nothing about a position in the same finest cell as the one
-  /// before.
-  std::optional<Place> FindNew(const Eigen::Vector3f& p_grid) {
-    const Eigen::Vector3i finest_cell = grid_.FinestCellOf(p_grid);
-    return finest_cell == finest_cell_ ? std::nullopt : Enter(finest_cell);
+template <class F>
+void PointGrid::ForBlocksIn(const Eigen::AlignedBox3f& box_grid, F&& f) const {
+  const Eigen::Vector3i first = BlockOf(FinestCellOf(box_grid.min()));
+  const Eigen::Vector3i last = BlockOf(FinestCellOf(box_grid.max()));
+  for (int x = first.x(); x <= last.x(); ++x) {
+    for (int y = first.y(); y <= last.y(); ++y) {
+      for (int z = first.z(); z <= last.z(); ++z) {
+        const int block = block_at_.Find({x, y, z});
+        if (block >= 0) f(static_cast<std::size_t>(block));
+      }
+    }
   }
-
- private:
-  std::optional<Place> Enter(const Eigen::Vector3i& finest_cell);
-
-  const PointGrid& grid_;
-  Eigen::Vector3i finest_cell_ = Eigen::Vector3i::Constant(std::numeric_limits<int>::max());
-  Eigen::Vector3i block_index_ = Eigen::Vector3i::Constant(std::numeric_limits<int>::max());
-  int block_ = -1;
-};
+}
 
 }  // namespace covsplat

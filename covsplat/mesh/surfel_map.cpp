@@ -36,19 +36,15 @@ SurfelDisc DiscOf(const SurfelMap& map, std::size_t i) {
 }
 
 std::size_t DropBroken(SurfelMap& map) {
-  std::vector<std::size_t> sound;
+  RowMoves sound;
   for (std::size_t i = 0; i < map.Size(); ++i) {
-    if (!IsSound(map.gaussians, i)) continue;
-    map.keyframe[sound.size()] = map.keyframe[i];
-    map.confidence[sound.size()] = map.confidence[i];
-    map.intensity[sound.size()] = map.intensity[i];
-    sound.push_back(i);
+    if (IsSound(map.gaussians, i)) sound.Add(sound.size++, i);
   }
-  const std::size_t dropped = map.Size() - sound.size();
-  map.gaussians.Gather(sound);
-  map.keyframe.resize(sound.size());
-  map.confidence.resize(sound.size());
-  map.intensity.resize(sound.size());
+  const std::size_t dropped = map.Size() - sound.size;
+  map.gaussians.Move(sound);
+  MoveRows(sound, map.keyframe);
+  MoveRows(sound, map.confidence);
+  MoveRows(sound, map.intensity);
   return dropped;
 }
 

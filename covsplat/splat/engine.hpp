@@ -68,9 +68,9 @@ class SplatEngine {
 
   /// Appends Gaussians given in the anchor's frame; returns where they went.
   virtual AnchorRange Append(int anchor, const GaussianColumns<float>& fresh) = 0;
-  /// Removes all Gaussians whose flag is 0 (one flag per row of Gaussians()) and joins the ranges
-  /// of each anchor. Returns for each new row its old row.
-  virtual std::vector<std::size_t> Keep(std::span<const std::uint8_t> keep) = 0;
+  /// Removes all Gaussians whose flag is 0 (one flag per row of Gaussians()). Returns where the
+  /// others have gone.
+  virtual RowMoves Keep(std::span<const std::uint8_t> keep) = 0;
   virtual const GaussianColumns<float>& Gaussians() const = 0;
   virtual const std::vector<AnchorRange>& Ranges() const = 0;
 

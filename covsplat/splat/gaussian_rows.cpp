@@ -20,7 +20,66 @@ AnchorTransform<S> ToTransform(const SE3& T_sensor_anchor) {
   return transform;
 }
 
+std::size_t Rows(const AnchorRange& range) { return range.end - range.begin; }
+
+KeptRows CloseUp(std::span<const AnchorRange> ranges, std::span<const std::uint8_t> keep) {
+  KeptRows kept;
+  for (const AnchorRange& range : ranges) {
+    std::size_t to = range.begin;
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      if (keep[i] != 0) kept.moves.Add(to++, i);
+    }
+    if (to > range.begin) kept.ranges.push_back({range.anchor, range.begin, to});
+  }
+  kept.moves.size = kept.ranges.empty() ? 0 : RoundUpToBlock(kept.ranges.back().end);
+  return kept;
+}
+
+/// Whether an eighth of the rows would be saved by joining the ranges of each anchor.
+bool IsWasteful(const KeptRows& kept) {
+  std::vector<std::size_t> of_anchor;
+  std::size_t rows = 0;
+  for (const AnchorRange& range : kept.ranges) {
+    const auto anchor = static_cast<std::size_t>(range.anchor);
+    if (anchor >= of_anchor.size()) of_anchor.resize(anchor + 1, 0);
+    of_anchor[anchor] += Rows(range);
+    rows += Rows(range);
+  }
+  std::size_t joined = 0;
+  for (const std::size_t count : of_anchor) joined += RoundUpToBlock(count);
+  return kept.moves.size > joined + rows / 8;
+}
+
+KeptRows JoinRanges(std::span<const AnchorRange> ranges, std::span<const std::uint8_t> keep) {
+  std::vector<AnchorRange> by_anchor(ranges.begin(), ranges.end());
+  std::ranges::stable_sort(by_anchor, {}, &AnchorRange::anchor);
+  KeptRows kept;
+  for (auto range = by_anchor.begin(); range != by_anchor.end();) {
+    AnchorRange now{range->anchor, kept.moves.size, kept.moves.size};
+    for (; range != by_anchor.end() && range->anchor == now.anchor; ++range) {
+      for (std::size_t i = range->begin; i < range->end; ++i) {
+        if (keep[i] != 0) kept.moves.Add(now.end++, i);
+      }
+    }
+    if (Rows(now) == 0) continue;
+    kept.ranges.push_back(now);
+    kept.moves.size = RoundUpToBlock(now.end);
+  }
+  return kept;
+}
+
 }  // namespace
+
+void RowMoves::Add(std::size_t to, std::size_t from) {
+  if (to == from) return;
+  const bool goes_on = !runs.empty() && to == runs.back().to + runs.back().count &&
+                       from == runs.back().from + runs.back().count;
+  if (goes_on) {
+    ++runs.back().count;
+  } else {
+    runs.push_back({to, from, 1});
+  }
+}
 
 void MakeInert(GaussianColumns<float>& table, std::size_t begin, std::size_t end) {
   for (int p = 0; p < kParameterCount; ++p) {
@@ -30,23 +89,8 @@ void MakeInert(GaussianColumns<float>& table, std::size_t begin, std::size_t end
 }
 
 KeptRows KeepRows(std::span<const AnchorRange> ranges, std::span<const std::uint8_t> keep) {
-  std::vector<AnchorRange> by_anchor(ranges.begin(), ranges.end());
-  std::ranges::stable_sort(by_anchor, {}, &AnchorRange::anchor);
-  KeptRows kept;
-  std::vector<std::size_t>& rows = kept.old_row;
-  for (auto range = by_anchor.begin(); range != by_anchor.end();) {
-    AnchorRange now{range->anchor, rows.size(), 0};
-    for (; range != by_anchor.end() && range->anchor == now.anchor; ++range) {
-      for (std::size_t i = range->begin; i < range->end; ++i) {
-        if (keep[i] != 0) rows.push_back(i);
-      }
-    }
-    now.end = rows.size();
-    if (now.end == now.begin) continue;
-    kept.ranges.push_back(now);
-    while (rows.size() < RoundUpToBlock(now.end)) rows.push_back(rows.size());
-  }
-  return kept;
+  KeptRows kept = CloseUp(ranges, keep);
+  return IsWasteful(kept) ? JoinRanges(ranges, keep) : kept;
 }
 
 template <class S>

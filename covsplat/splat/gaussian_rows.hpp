@@ -18,12 +18,15 @@ inline std::size_t RoundUpToBlock(std::size_t rows) {
 /// Harmless values for padding rows and for rows that are about to be written.
 void MakeInert(GaussianColumns<float>& table, std::size_t begin, std::size_t end);
 
-/// What remains of a table: new ranges, one for each anchor that has Gaussians, ascending, and for
-/// each new row its old row. Rows of an anchor keep their order; padding rows point to themselves.
+/// What remains of a table. Rows of an anchor keep their order.
 struct KeptRows {
-  std::vector<AnchorRange> ranges;
-  std::vector<std::size_t> old_row;
+  std::vector<AnchorRange> ranges;  ///< ascending
+  RowMoves moves;
 };
+
+/// Moves rows within their ranges, which leaves padding behind, so that long tables cost no more
+/// than short ones. When that has become too much the whole table moves together, and the ranges of
+/// each anchor are joined.
 KeptRows KeepRows(std::span<const AnchorRange> ranges, std::span<const std::uint8_t> keep);
 
 /// The Gaussians that a view has to look at. Anchors out of reach of the sensor are left out: a

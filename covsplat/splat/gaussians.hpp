@@ -1,6 +1,7 @@
 // The map's primitives: flat 2D Gaussians (surfels) stored one column per parameter.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -23,16 +24,38 @@ void ResizeTightly(std::vector<T, Allocator>& values, std::size_t size) {
   values.resize(size);
 }
 
-/// Value i becomes what value old_row[i] was; what stays where it is costs nothing.
+/// Rows of a table that are elsewhere now.
+struct RowRun {
+  std::size_t to = 0;
+  std::size_t from = 0;
+  std::size_t count = 0;
+};
+
+/// What becomes of a table whose rows are moved or left out. Rows in no run stay where they are, if
+/// the table is still that long.
+struct RowMoves {
+  std::size_t size = 0;  ///< of the table now
+  std::vector<RowRun> runs;
+
+  /// One row after the other; one that stays where it was is none.
+  void Add(std::size_t to, std::size_t from);
+};
+
+/// Costs as much as what moves, however long the table is.
 template <class T, class Allocator>
-void GatherRows(std::span<const std::size_t> old_row, std::vector<T, Allocator>& values) {
-  std::size_t same = 0;
-  while (same < old_row.size() && old_row[same] == same) ++same;
+void MoveRows(const RowMoves& moves, std::vector<T, Allocator>& values) {
   std::vector<T> moved;
-  moved.reserve(old_row.size() - same);
-  for (const std::size_t i : old_row.subspan(same)) moved.push_back(values[i]);
-  values.resize(same);
-  values.insert(values.end(), moved.begin(), moved.end());
+  for (const RowRun& run : moves.runs) {
+    const auto from = values.begin() + static_cast<std::ptrdiff_t>(run.from);
+    moved.insert(moved.end(), from, from + static_cast<std::ptrdiff_t>(run.count));
+  }
+  values.resize(moves.size);
+  auto next = moved.begin();
+  for (const RowRun& run : moves.runs) {
+    const auto end = next + static_cast<std::ptrdiff_t>(run.count);
+    std::copy(next, end, values.begin() + static_cast<std::ptrdiff_t>(run.to));
+    next = end;
+  }
 }
 
 /// Equally long columns, each followed by kBlockSize readable values.
@@ -49,13 +72,12 @@ class ColumnTable {
   S* Column(int column) { return columns_[static_cast<std::size_t>(column)].data(); }
   const S* Column(int column) const { return columns_[static_cast<std::size_t>(column)].data(); }
 
-  /// Row i becomes what row old_row[i] was.
-  void Gather(std::span<const std::size_t> old_row) {
+  void Move(const RowMoves& moves) {
     for (auto& column : columns_) {
-      GatherRows(old_row, column);
-      ResizeTightly(column, old_row.size() + kBlockSize);
+      MoveRows(moves, column);
+      ResizeTightly(column, moves.size + kBlockSize);
     }
-    size_ = old_row.size();
+    size_ = moves.size;
   }
 
  private:

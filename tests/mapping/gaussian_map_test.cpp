@@ -152,17 +152,14 @@ TEST_F(GaussianMapTest, MarksAsSeenOnlyWhatAKeyframeMeasuresInItsPlace) {
 
 TEST_F(GaussianMapTest, PrunesWhatKeyframesInARowSeeThrough) {
   map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), GaussiansAt({{5, 0, 0}, {3, 0, 0}, {6, 0, 0}}));
-  map_.MarkSeen(0,
-                SphereKeyframe(SE3(), 5.0f),
-                sensor_,
-                kMaxAge);  // the second is in front, the third behind
-  EXPECT_EQ(map_.PruneSeenThrough(2), 0u);
-  map_.MarkSeen(
-      0, SphereKeyframe(SE3(), 3.0f), sensor_, kMaxAge);  // now it is where it was: it counts anew
-  map_.MarkSeen(0, SphereKeyframe(SE3(), 5.0f), sensor_, kMaxAge);
-  EXPECT_EQ(map_.PruneSeenThrough(2), 0u);
-  map_.MarkSeen(0, SphereKeyframe(SE3(), 5.0f), sensor_, kMaxAge);
-  EXPECT_EQ(map_.PruneSeenThrough(2), 1u);
+  const auto pruned_by = [&](float range_m) {
+    const Keyframe keyframe = SphereKeyframe(SE3(), range_m);
+    return map_.PruneSeenThrough(map_.MarkSeen(0, keyframe, sensor_, kMaxAge), 2);
+  };
+  EXPECT_EQ(pruned_by(5.0f), 0u) << "the second is in front, the third behind";
+  EXPECT_EQ(pruned_by(3.0f), 0u) << "now it is where it was: it counts anew";
+  EXPECT_EQ(pruned_by(5.0f), 0u);
+  EXPECT_EQ(pruned_by(5.0f), 1u);
   EXPECT_EQ(map_.Size(), 2u);
 }
 
@@ -184,8 +181,8 @@ TEST_F(GaussianMapTest, KeepsWhatWasLongUnseenWhileTheWayMayHaveDrifted) {
         sphere.measurement.normal(row, column) = -sensor_.RayOf(row, column);
       }
     }
-    for (int k = 0; k < 2; ++k) map_.MarkSeen(keyframes + k, sphere, sensor_, kMaxAge);
-    return map_.PruneSeenThrough(2);
+    map_.MarkSeen(keyframes, sphere, sensor_, kMaxAge);
+    return map_.PruneSeenThrough(map_.MarkSeen(keyframes + 1, sphere, sensor_, kMaxAge), 2);
   };
   EXPECT_EQ(through_after(kMaxAge - 1, 40), 40u) << "a moment ago they were there";
   EXPECT_EQ(through_after(kMaxAge + 1, 40), 0u) << "all of the map is elsewhere";

@@ -107,28 +107,6 @@ TEST(SplatEngine, ADroppedViewTakesNoMoreSteps) {
   EXPECT_GT(engine->Step(0, false).range_loss, 0.0);
 }
 
-TEST(SplatEngine, KeepingRowsJoinsTheRangesOfAnAnchor) {
-  ThreadPool pool(1);
-  const auto engine = MakeEngine(pool);
-  const GaussianColumns<float> room = NoisyRoom(RoomSensor(), RoomMeasurement(RoomSensor()));
-  engine->AddAnchor(SE3());
-  engine->AddAnchor(SE3());
-  for (const int anchor : {0, 1, 0}) engine->Append(anchor, room);
-  const AnchorRange second_of_0 = engine->Ranges()[2];
-  std::vector<std::uint8_t> keep(engine->Gaussians().Size(), 1);
-  keep[0] = 0;
-  const std::vector<std::size_t> old_row = engine->Keep(keep);
-  ASSERT_EQ(engine->Ranges().size(), 2u);
-  const AnchorRange& of_0 = engine->Ranges()[0];
-  EXPECT_EQ(of_0.anchor, 0);
-  EXPECT_EQ(of_0.end - of_0.begin, 2 * room.Size() - 1);
-  EXPECT_EQ(old_row[of_0.begin], 1u);
-  EXPECT_EQ(old_row[of_0.end - 1], second_of_0.end - 1);
-  EXPECT_EQ(engine->Ranges()[1].anchor, 1);
-  EXPECT_EQ(engine->Ranges()[1].end - engine->Ranges()[1].begin, room.Size());
-  EXPECT_EQ(MeanOf(engine->Gaussians(), of_0.end - 1), MeanOf(room, room.Size() - 1));
-}
-
 TEST(SplatEngine, AMovedAnchorTakesItsGaussiansAlong) {
   ThreadPool pool(1);
   ExpectAMovedAnchorTakesItsGaussiansAlong(*MakeEngine(pool));
@@ -144,7 +122,7 @@ TEST(SplatEngine, KeepRemovesTheOthersAndNothingElse) {
   const GaussianColumns<float> before = engine->Gaussians();
   std::vector<std::uint8_t> keep(before.Size(), 1);
   for (std::size_t i = 0; i < keep.size(); i += 3) keep[i] = 0;
-  const std::vector<std::size_t> old_row = engine->Keep(keep);
+  const std::vector<std::size_t> old_row = OldRows(engine->Keep(keep));
   std::size_t kept = 0;
   for (const AnchorRange& range : engine->Ranges()) {
     EXPECT_EQ(range.begin % kBlockSize, 0u);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -14,6 +16,16 @@
 #include "covsplat/splat/engine.hpp"
 
 namespace covsplat {
+
+/// Which row of the old table each of the new one is; padding counts as where it is.
+inline std::vector<std::size_t> OldRows(const RowMoves& moves) {
+  std::vector<std::size_t> old_row(moves.size);
+  std::iota(old_row.begin(), old_row.end(), std::size_t{0});
+  for (const RowRun& run : moves.runs) {
+    for (std::size_t k = 0; k < run.count; ++k) old_row[run.to + k] = run.from + k;
+  }
+  return old_row;
+}
 
 /// A small sensor with uneven beams, so that the row table has real slopes.
 inline SensorModel SmallSensor(int columns = 64) {

@@ -59,17 +59,17 @@ AnchorRange CpuEngine::Append(int anchor, const GaussianColumns<float>& fresh) {
   return ranges_.back();
 }
 
-std::vector<std::size_t> CpuEngine::Keep(std::span<const std::uint8_t> keep) {
+RowMoves CpuEngine::Keep(std::span<const std::uint8_t> keep) {
   COVSPLAT_CHECK(keep.size() == gaussians_.Size());
   KeptRows kept = KeepRows(ranges_, keep);
-  gaussians_.Gather(kept.old_row);
-  moments_.Gather(kept.old_row);
+  gaussians_.Move(kept.moves);
+  moments_.Move(kept.moves);
   ranges_ = std::move(kept.ranges);
   for (const AnchorRange& range : ranges_) {
     MakeInert(gaussians_, range.end, RoundUpToBlock(range.end));
   }
-  ResizeTables(kept.old_row.size());
-  return std::move(kept.old_row);
+  ResizeTables(kept.moves.size);
+  return std::move(kept.moves);
 }
 
 void CpuEngine::SetView(int anchor, const RangeMeasurement& measurement) {

@@ -22,7 +22,7 @@ class CpuEngine final : public SplatEngine {
   void SetAnchorPose(int anchor, const SE3& T_map_anchor) override;
   const std::vector<SE3>& AnchorPoses() const override { return T_map_anchor_; }
   AnchorRange Append(int anchor, const GaussianColumns<float>& fresh) override;
-  std::vector<std::size_t> Keep(std::span<const std::uint8_t> keep) override;
+  RowMoves Keep(std::span<const std::uint8_t> keep) override;
   const GaussianColumns<float>& Gaussians() const override { return gaussians_; }
   const std::vector<AnchorRange>& Ranges() const override { return ranges_; }
   void SetView(int anchor, const RangeMeasurement& measurement) override;

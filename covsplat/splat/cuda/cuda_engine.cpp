@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "covsplat/core/check.hpp"
@@ -126,10 +127,16 @@ AnchorRange CudaEngine::Append(int anchor, const GaussianColumns<float>& fresh) 
   return ranges_.back();
 }
 
-std::vector<std::size_t> CudaEngine::Keep(std::span<const std::uint8_t> keep) {
+RowMoves CudaEngine::Keep(std::span<const std::uint8_t> keep) {
   COVSPLAT_CHECK(keep.size() == gaussians_.Size());
   KeptRows kept = KeepRows(ranges_, keep);
-  const std::vector<std::uint32_t> old_row(kept.old_row.begin(), kept.old_row.end());
+  std::vector<std::uint32_t> old_row(kept.moves.size);
+  std::iota(old_row.begin(), old_row.end(), 0u);
+  for (const RowRun& run : kept.moves.runs) {
+    std::iota(old_row.begin() + static_cast<std::ptrdiff_t>(run.to),
+              old_row.begin() + static_cast<std::ptrdiff_t>(run.to + run.count),
+              static_cast<std::uint32_t>(run.from));
+  }
   DeviceBuffer<std::uint32_t> device_old_row;
   device_old_row.Upload(old_row, stream_);
   gaussians_.Gather(device_old_row.Data(), old_row.size(), stream_);
@@ -138,7 +145,7 @@ std::vector<std::size_t> CudaEngine::Keep(std::span<const std::uint8_t> keep) {
   ranges_ = std::move(kept.ranges);
   host_is_current_ = false;
   current_view_ = -1;
-  return std::move(kept.old_row);
+  return std::move(kept.moves);
 }
 
 const GaussianColumns<float>& CudaEngine::Gaussians() const {
