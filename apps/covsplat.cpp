@@ -2,6 +2,10 @@
 #include <cstdio>
 #include <exception>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include "apps/commands/commands.hpp"
 #include "apps/exit_code.hpp"
 #include <CLI/CLI.hpp>
@@ -46,6 +50,11 @@ int Run(int argc, char** argv) {
 }  // namespace covsplat
 
 int main(int argc, char** argv) {
+  // Tables that grow all the time, with what is freed of them left in the heap, would take twice
+  // the memory. By itself malloc raises this to 32 MB.
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 512 * 1024);
+#endif
   try {
     return covsplat::Run(argc, argv);
   } catch (const std::bad_alloc&) {

@@ -21,7 +21,6 @@ from covsplat_run import TRACKING, ate_m, frames_of, stage_ms
 from processes import run_program
 from se3 import ways_along
 
-RATE = 2.0  # times as fast as the stamps say
 HEADER = (
     "way m",
     "scans",
@@ -38,6 +37,7 @@ HEADER = (
 
 @dataclass(frozen=True)
 class Scan:
+    stamp_s: float
     way_m: float
     is_keyframe: bool
     gaussians: int
@@ -50,13 +50,13 @@ class Scan:
 def main() -> int:
     options = parse()
     command = [str(options.covsplat), "run", str(options.recording), "-o", str(options.out)]
-    run_program([*command, "--realtime", "--rate", str(RATE), "--overwrite", "--quiet"])
+    run_program([*command, "--realtime", "--overwrite", "--quiet"])
     scans = scans_of(options.out)
     parts = [
         [scan for scan in scans if begin <= scan.way_m < begin + options.part_m]
         for begin in np.arange(0.0, scans[-1].way_m, options.part_m)
     ]
-    errors = errors_after(options, [len(part) for part in parts])
+    errors = errors_until(options, [part[-1].stamp_s for part in parts])
     rows = [row(part, error_m) for part, error_m in zip(parts, errors, strict=True)]
     table = report.table(HEADER, rows)
     page.publish(f"\n{summary(options.out)}\n\n{table}\n", "growth", options.update)
@@ -74,11 +74,11 @@ def parse() -> argparse.Namespace:
 
 
 def scans_of(run: Path) -> list[Scan]:
-    positions_m = np.loadtxt(run / "trajectory_tum.txt")[:, 1:4]
-    way_m = ways_along(positions_m)
+    """Those that were tracked; others have poses, too."""
+    poses = np.loadtxt(run / "trajectory_tum.txt")
+    ways_m = ways_along(poses[:, 1:4])
     frames = frames_of(run)
-    if len(frames) != len(way_m):
-        raise SystemExit(f"{run}: {len(frames)} scans were tracked, {len(way_m)} have poses")
+    way_m = np.interp([float(frame["stamp_s"]) for frame in frames], poses[:, 0], ways_m)
     return [scan_of(frame, float(way)) for frame, way in zip(frames, way_m, strict=True)]
 
 
@@ -97,6 +97,7 @@ def summary(run: Path) -> str:
 
 def scan_of(frame: dict[str, str], way_m: float) -> Scan:
     return Scan(
+        float(frame["stamp_s"]),
         way_m,
         frame["keyframe"] == "1",
         int(frame["gaussians"]),
@@ -107,14 +108,15 @@ def scan_of(frame: dict[str, str], way_m: float) -> Scan:
     )
 
 
-def errors_after(options: argparse.Namespace, lengths: list[int]) -> list[float]:
-    """ATE of the trajectory's beginning, up to the end of each part."""
+def errors_until(options: argparse.Namespace, stamps_s: list[float]) -> list[float]:
+    """ATE of the trajectory's beginning, up to each stamp."""
     lines = (options.out / "trajectory_tum.txt").read_text().splitlines(keepends=True)
     beginning = options.out / "beginning_tum.txt"
     truth = options.recording / "gt_tum.txt"
     errors = []
-    for end in np.cumsum(lengths):
-        beginning.write_text("".join(lines[:end]))
+    for stamp_s in stamps_s:
+        early = [line for line in lines if float(line.split()[0]) <= stamp_s]
+        beginning.write_text("".join(early))
         errors.append(ate_m(options.covsplat, beginning, truth))
     beginning.unlink()
     return errors

@@ -25,10 +25,10 @@ void SyncFolder(const std::filesystem::path& folder) {
   close(descriptor);
 }
 
-Result<void> WriteDurably(const std::filesystem::path& path, std::string_view bytes) {
+Result<void> WriteDurably(const std::filesystem::path& path, const WriteParts& parts) {
   Result<AppendFile> file = AppendFile::Open(path);
   if (!file) return Forward(file);
-  return file->Append(bytes).and_then([&] { return file->Sync(); }).and_then([&] {
+  return parts(*file).and_then([&] { return file->Sync(); }).and_then([&] {
     return file->Close();
   });
 }
@@ -77,9 +77,13 @@ Result<void> AppendFile::Close() {
 }
 
 Result<void> WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes) {
+  return WriteFileAtomically(path, [&](AppendFile& file) { return file.Append(bytes); });
+}
+
+Result<void> WriteFileAtomically(const std::filesystem::path& path, const WriteParts& parts) {
   std::filesystem::path temporary = path;
   temporary += ".tmp";
-  Result<void> written = WriteDurably(temporary, bytes);
+  Result<void> written = WriteDurably(temporary, parts);
   if (written && std::rename(temporary.c_str(), path.c_str()) != 0) {
     written = CannotWrite(path, errno);
   }

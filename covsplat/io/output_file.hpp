@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -38,5 +39,9 @@ class AppendFile {
 /// Writes a file so that a reader, or a crash at any moment, sees the old or the new one but never
 /// a part: the bytes go to `path` + ".tmp" and get their name when the storage has them.
 Result<void> WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes);
+
+/// The same with bytes that come part by part.
+using WriteParts = std::function<Result<void>(AppendFile&)>;
+Result<void> WriteFileAtomically(const std::filesystem::path& path, const WriteParts& parts);
 
 }  // namespace covsplat

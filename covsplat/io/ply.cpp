@@ -37,13 +37,13 @@ Result<std::vector<Eigen::Vector3f>> Positions(const PointTable& table, const st
   return positions;
 }
 
-std::string HeaderText(const PointTable& vertices) {
+std::string HeaderText(const PointTable& vertices, std::size_t rows) {
   std::string text = "ply\nformat binary_little_endian 1.0\n";
   for (const std::string& comment : vertices.comments) {
     COVSPLAT_CHECK(comment.find('\n') == std::string::npos);
     text += "comment " + comment + "\n";
   }
-  text += fmt::format("element vertex {}\n", vertices.Rows());
+  text += fmt::format("element vertex {}\n", rows);
   for (const PointColumn& column : vertices.columns) {
     COVSPLAT_CHECK(column.Size() == vertices.Rows() && !PlyTypeName(column.Type()).empty());
     text += fmt::format("property {} {}\n", PlyTypeName(column.Type()), column.name);
@@ -51,9 +51,7 @@ std::string HeaderText(const PointTable& vertices) {
   return text;
 }
 
-/// The vertices' header and bodies, with more header lines between them.
-std::string VertexBytes(const PointTable& vertices, const std::string& more_header) {
-  std::string bytes = HeaderText(vertices) + more_header + "end_header\n";
+void AppendRows(const PointTable& vertices, std::string& bytes) {
   std::size_t stride = 0;
   for (const PointColumn& column : vertices.columns) stride += SizeOf(column.Type());
   std::size_t first = bytes.size();
@@ -62,7 +60,6 @@ std::string VertexBytes(const PointTable& vertices, const std::string& more_head
     CopyBytes(column.values, bytes.data() + first, stride);
     first += SizeOf(column.Type());
   }
-  return bytes;
 }
 
 void AddColumns(const std::array<const char*, 3>& names,
@@ -125,16 +122,33 @@ Result<TriangleMesh> ParseTriangleMesh(std::string_view bytes, const std::string
 }
 
 Result<void> WritePly(const std::filesystem::path& path, const PointTable& vertices) {
-  return WriteFileAtomically(path, VertexBytes(vertices, ""));
+  std::string bytes = HeaderText(vertices, vertices.Rows()) + "end_header\n";
+  AppendRows(vertices, bytes);
+  return WriteFileAtomically(path, bytes);
+}
+
+Result<void> WritePly(const std::filesystem::path& path,
+                      std::size_t rows,
+                      const std::function<PointTable(std::size_t, std::size_t)>& part) {
+  constexpr std::size_t kRowsAtOnce = 65536;
+  return WriteFileAtomically(path, [&](AppendFile& file) {
+    Result<void> written = file.Append(HeaderText(part(0, 0), rows) + "end_header\n");
+    for (std::size_t begin = 0; written && begin < rows; begin += kRowsAtOnce) {
+      std::string bytes;
+      AppendRows(part(begin, std::min(begin + kRowsAtOnce, rows)), bytes);
+      written = file.Append(bytes);
+    }
+    return written;
+  });
 }
 
 Result<void> WritePlyMesh(const std::filesystem::path& path,
                           const PointTable& vertices,
                           std::span<const Eigen::Vector3i> triangles) {
-  std::string bytes = VertexBytes(vertices,
-                                  fmt::format("element face {}\nproperty list uchar int "
-                                              "vertex_indices\n",
-                                              triangles.size()));
+  std::string bytes = HeaderText(vertices, vertices.Rows());
+  bytes += fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+                       triangles.size());
+  AppendRows(vertices, bytes);
   bytes.reserve(bytes.size() + 13 * triangles.size());
   for (const Eigen::Vector3i& triangle : triangles) {
     bytes.push_back(3);

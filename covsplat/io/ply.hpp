@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -26,6 +27,11 @@ Result<TriangleMesh> ParseTriangleMesh(std::string_view bytes, const std::string
 /// Writes the vertices as binary_little_endian, at once. Comments must be single lines; columns of
 /// 64-bit integers do not exist in PLY.
 Result<void> WritePly(const std::filesystem::path& path, const PointTable& vertices);
+
+/// The same of a table too large to be there at once: `part(begin, end)` makes some of its rows.
+Result<void> WritePly(const std::filesystem::path& path,
+                      std::size_t rows,
+                      const std::function<PointTable(std::size_t, std::size_t)>& part);
 
 /// The same with faces (int vertex_indices).
 Result<void> WritePlyMesh(const std::filesystem::path& path,

@@ -12,17 +12,29 @@ namespace {
 
 constexpr float kShOfColor = 0.28209479177387814f;  // band 0 of the spherical harmonics
 
-std::vector<float> ColumnOf(const SavedMap& map, Parameter parameter) {
-  const float* column = map.gaussians.Column(parameter);
-  return {column, column + map.Size()};
-}
+// Rows of the map that are to be written at once.
+struct Part {
+  const SavedMap& map;
+  std::size_t begin;
+  std::size_t end;
 
-void AddNormals(const SavedMap& map, PointTable& table) {
+  std::vector<float> Of(Parameter parameter) const {
+    const float* column = map.gaussians.Column(parameter);
+    return {column + begin, column + end};
+  }
+  template <class T>
+  std::vector<float> Of(const std::vector<T>& values) const {
+    return {values.begin() + static_cast<std::ptrdiff_t>(begin),
+            values.begin() + static_cast<std::ptrdiff_t>(end)};
+  }
+};
+
+void AddNormals(const Part& part, PointTable& table) {
   constexpr std::array<const char*, 3> kNormal = {"nx", "ny", "nz"};
   constexpr std::array<const char*, 3> kColor = {"f_dc_0", "f_dc_1", "f_dc_2"};
   std::array<std::vector<float>, 3> normal, color;
-  for (std::size_t i = 0; i < map.Size(); ++i) {
-    const Eigen::Vector3f n = NormalOf(map.gaussians, i);
+  for (std::size_t i = part.begin; i < part.end; ++i) {
+    const Eigen::Vector3f n = NormalOf(part.map.gaussians, i);
     for (std::size_t k = 0; k < 3; ++k) {
       const float component = n[static_cast<Eigen::Index>(k)];
       normal[k].push_back(component);
@@ -33,32 +45,29 @@ void AddNormals(const SavedMap& map, PointTable& table) {
   for (std::size_t k = 0; k < 3; ++k) table.columns.push_back({kColor[k], std::move(color[k])});
 }
 
-PointTable TableOf(const SavedMap& map) {
+PointTable TableOf(const Part& part) {
   PointTable table;
   table.comments = {"SplatRenderMode: 2dgs", "Vertical axis: z"};
   const auto add = [&](const char* name, std::vector<float> values) {
     table.columns.push_back({name, std::move(values)});
   };
-  const auto floats = [](const std::vector<int>& v) {
-    return std::vector<float>(v.begin(), v.end());
-  };
-  add("x", ColumnOf(map, kMeanX));
-  add("y", ColumnOf(map, kMeanY));
-  add("z", ColumnOf(map, kMeanZ));
-  AddNormals(map, table);
-  add("opacity", ColumnOf(map, kOpacityLogit));
-  add("scale_0", ColumnOf(map, kLogScaleU));
-  add("scale_1", ColumnOf(map, kLogScaleV));
-  add("scale_2", std::vector<float>(map.Size(), std::log(kThicknessM)));
-  add("rot_0", ColumnOf(map, kQuatW));
-  add("rot_1", ColumnOf(map, kQuatX));
-  add("rot_2", ColumnOf(map, kQuatY));
-  add("rot_3", ColumnOf(map, kQuatZ));
-  add("confidence", map.confidence);
-  add("control_score", map.control_score);
-  add("intensity", map.intensity);
-  add("keyframe", floats(map.keyframe));
-  add("last_seen", floats(map.last_seen));
+  add("x", part.Of(kMeanX));
+  add("y", part.Of(kMeanY));
+  add("z", part.Of(kMeanZ));
+  AddNormals(part, table);
+  add("opacity", part.Of(kOpacityLogit));
+  add("scale_0", part.Of(kLogScaleU));
+  add("scale_1", part.Of(kLogScaleV));
+  add("scale_2", std::vector<float>(part.end - part.begin, std::log(kThicknessM)));
+  add("rot_0", part.Of(kQuatW));
+  add("rot_1", part.Of(kQuatX));
+  add("rot_2", part.Of(kQuatY));
+  add("rot_3", part.Of(kQuatZ));
+  add("confidence", part.Of(part.map.confidence));
+  add("control_score", part.Of(part.map.control_score));
+  add("intensity", part.Of(part.map.intensity));
+  add("keyframe", part.Of(part.map.keyframe));
+  add("last_seen", part.Of(part.map.last_seen));
   return table;
 }
 
@@ -79,7 +88,9 @@ std::vector<T> Values(const PointTable& table, std::string_view name, T missing)
 }  // namespace
 
 Result<void> WriteMapPly(const std::filesystem::path& path, const SavedMap& map) {
-  return WritePly(path, TableOf(map));
+  return WritePly(path, map.Size(), [&](std::size_t begin, std::size_t end) {
+    return TableOf({map, begin, end});
+  });
 }
 
 Result<SavedMap> ParseMapPly(std::string_view bytes, const std::string& file) {
