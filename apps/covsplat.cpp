@@ -51,9 +51,11 @@ int Run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   // Tables that grow all the time, with what is freed of them left in the heap, would take twice
-  // the memory. By itself malloc raises this to 32 MB.
+  // the memory: by itself malloc raises the first to 32 MB. What is smaller is needed again with
+  // the next keyframe, and is kept.
 #ifdef __GLIBC__
-  mallopt(M_MMAP_THRESHOLD, 512 * 1024);
+  mallopt(M_MMAP_THRESHOLD, 4 << 20);
+  mallopt(M_TRIM_THRESHOLD, 64 << 20);
 #endif
   try {
     return covsplat::Run(argc, argv);

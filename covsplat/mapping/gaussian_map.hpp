@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "covsplat/core/parallel.hpp"
 #include "covsplat/mapping/spawn.hpp"
 
 namespace covsplat {
@@ -17,7 +18,8 @@ struct NearGaussians {
 /// One owner, one thread. Keyframes are the engine's anchors, numbered alike.
 class GaussianMap {
  public:
-  explicit GaussianMap(std::unique_ptr<SplatEngine> engine) : engine_(std::move(engine)) {}
+  GaussianMap(std::unique_ptr<SplatEngine> engine, ThreadPool& pool)
+      : engine_(std::move(engine)), pool_(&pool) {}
 
   /// Adds a keyframe with its new Gaussians, which it has seen and which are trackable, and makes
   /// its measurement a training view. Returns the keyframe's number.
@@ -67,6 +69,7 @@ class GaussianMap {
 
  private:
   std::unique_ptr<SplatEngine> engine_;
+  ThreadPool* pool_;
   std::vector<GaussianSignals> signals_;
   GaussianColumns<float> as_spawned_;
 };

@@ -32,7 +32,7 @@ Mapper::Mapper(std::unique_ptr<SplatEngine> engine,
     : sensor_(sensor),
       config_(config),
       pool_(pool),
-      map_(std::move(engine)),
+      map_(std::move(engine), pool),
       free_space_(sensor, config.reliability),
       views_(map_, static_cast<std::size_t>(sensor.Rows() * sensor.Columns()), config.schedule) {}
 

@@ -8,6 +8,14 @@
 namespace covsplat {
 namespace {
 
+/// Calls f(i) for each of many small things.
+template <class F>
+void ForEach(ThreadPool& pool, std::size_t count, F&& f) {
+  ParallelFor(pool, count, 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) f(i);
+  });
+}
+
 constexpr double kNoiseWithoutCells = 0.02;
 /// Cosine of the flattest incidence at which the noise of ranges can be told.
 constexpr double kHeadOn = 0.5;
@@ -59,17 +67,32 @@ void ForEighths(std::span<const PointCell> cells, int levels_below, F&& f) {
   }
 }
 
+/// Variances of ranges to flat surfaces, of the eighths of a block.
+void AppendNoise(std::span<const PointCell> block,
+                 int levels,
+                 int min_points,
+                 std::vector<double>& variance) {
+  ForEighths(block, std::max(0, levels - 1), [&](auto cells) {
+    const Moments moments = SumOf(cells);
+    if (moments.count < 5.0 * min_points) return;
+    const Plane plane = PlaneOf(moments);
+    if (plane.cosine < kHeadOn || plane.variance[1] < 4.0 * plane.variance[2]) return;
+    variance.push_back(plane.variance[2] / (plane.cosine * plane.cosine));
+  });
+}
+
 /// Standard deviation of ranges to flat surfaces: the median among the eighths of the blocks.
-double EstimateNoise(const PointGrid& grid, int min_points) {
+double EstimateNoise(const PointGrid& grid, int min_points, ThreadPool& pool) {
+  constexpr std::size_t kChunk = 256;
+  std::vector<std::vector<double>> parts((grid.Blocks() + kChunk - 1) / kChunk);
+  ParallelFor(pool, grid.Blocks(), kChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) {
+      AppendNoise(grid.Cells(b), grid.Levels(), min_points, parts[begin / kChunk]);
+    }
+  });
   std::vector<double> variance;
-  for (std::size_t b = 0; b < grid.Blocks(); ++b) {
-    ForEighths(grid.Cells(b), std::max(0, grid.Levels() - 1), [&](auto cells) {
-      const Moments moments = SumOf(cells);
-      if (moments.count < 5.0 * min_points) return;
-      const Plane plane = PlaneOf(moments);
-      if (plane.cosine < kHeadOn || plane.variance[1] < 4.0 * plane.variance[2]) return;
-      variance.push_back(plane.variance[2] / (plane.cosine * plane.cosine));
-    });
+  for (const std::vector<double>& part : parts) {
+    variance.insert(variance.end(), part.begin(), part.end());
   }
   if (variance.empty()) return kNoiseWithoutCells;
   const auto middle = variance.begin() + static_cast<std::ptrdiff_t>(variance.size() / 2);
@@ -158,13 +181,18 @@ void FitCells(std::span<const PointCell> cells,
 /// The square that a disc stands for, in the frame of the grid.
 struct Square {
   Eigen::Vector3f middle;
-  Eigen::Matrix3f axes;  ///< columns: along its edges, normal
-  Eigen::Vector3f half;  ///< of its sides, and of a little thickness
+  Eigen::Matrix3f axes;   ///< columns: along its edges, normal
+  Eigen::Vector3f half;   ///< of its sides, and of a little thickness
+  Eigen::Vector3f width;  ///< of a cube with edges of 2 m, seen along its axes
 
   Eigen::AlignedBox3f Box() const {
     const Eigen::Vector3f reach = axes.cwiseAbs() * half;
     return {middle - reach, middle + reach};
   }
+
+  /// How far from it, along its axes, the middles of cells are that it meets (of the separating
+  /// axes of two boxes those that matter).
+  Eigen::Vector3f ReachTo(float half_cell) const { return half + half_cell * width; }
 };
 
 /// A disc also passes through cells on either side that are close to it, but not through those that
@@ -179,16 +207,13 @@ Square SquareOf(const Disc& disc, double edge_sigmas, float finest_m) {
   square.middle = disc.mean;
   square.axes << disc.u.normalized(), disc.v.normalized(), disc.u.cross(disc.v).normalized();
   square.half << half(disc.u), half(disc.v), 0.15f * finest_m;
+  square.width = square.axes.cwiseAbs().colwise().sum().transpose();
   return square;
 }
 
-/// Whether a square and a cell lie apart along an axis of the square (of the separating axes of two
-/// boxes those that matter).
 bool Meets(const Square& square, const Eigen::Vector3f& cell_middle, float half_cell) {
   const Eigen::Vector3f apart = square.axes.transpose() * (cell_middle - square.middle);
-  const Eigen::Vector3f reach =
-      square.half + half_cell * square.axes.cwiseAbs().colwise().sum().transpose();
-  return (apart.cwiseAbs().array() <= reach.array()).all();
+  return (apart.cwiseAbs().array() <= square.ReachTo(half_cell).array()).all();
 }
 
 /// [block] indices of squares, ascending.
@@ -220,6 +245,49 @@ SquaresOfBlocks SortIntoBlocks(std::span<const Square> squares,
   return of_blocks;
 }
 
+/// The cells of a block, side by side.
+class BlockCells {
+ public:
+  void Fill(const PointGrid& grid, std::size_t block) {
+    const std::span<const PointCell> cells = grid.Cells(block);
+    for (std::vector<float>* axis : {&x_, &y_, &z_}) axis->resize(cells.size());
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      const Eigen::Vector3d middle = grid.MiddleOf(block, cells[i].code);
+      x_[i] = static_cast<float>(middle.x());
+      y_[i] = static_cast<float>(middle.y());
+      z_[i] = static_cast<float>(middle.z());
+    }
+    density_.assign(cells.size(), -1.0f);
+    disc_.assign(cells.size(), kNone);
+  }
+
+  /// Notes the disc in those cells that it passes through and no denser one does.
+  void Pass(const Square& square, float half_cell, int disc, float density) {
+    const Eigen::Matrix3f to_square = square.axes.transpose();
+    const Eigen::Vector3f offset = to_square * square.middle;
+    const Eigen::Vector3f reach = square.ReachTo(half_cell);
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+      const auto apart = [&](int axis) {
+        return std::abs(to_square(axis, 0) * x_[i] + to_square(axis, 1) * y_[i] +
+                        to_square(axis, 2) * z_[i] - offset[axis]);
+      };
+      const bool is_met = (apart(0) <= reach[0]) & (apart(1) <= reach[1]) & (apart(2) <= reach[2]);
+      const bool is_densest = is_met & (density > density_[i]);
+      density_[i] = is_densest ? density : density_[i];
+      disc_[i] = is_densest ? disc : disc_[i];
+    }
+  }
+
+  int Densest(std::size_t cell) const { return disc_[cell]; }
+
+ private:
+  std::vector<float> x_;
+  std::vector<float> y_;
+  std::vector<float> z_;
+  std::vector<float> density_;
+  std::vector<int> disc_;
+};
+
 /// [block][code] indices of discs, or none.
 using DiscsOfCells = std::vector<std::vector<int>>;
 
@@ -230,42 +298,39 @@ DiscsOfCells DensestDiscs(std::span<const Disc> discs_grid,
                           ThreadPool& pool) {
   constexpr float kInsideCell = 0.75f;  // a corner that is touched is not passed through
   const auto finest_m = static_cast<float>(grid.CellSize(grid.Levels()));
-  std::vector<Square> squares;
-  squares.reserve(discs_grid.size());
-  for (const Disc& disc : discs_grid) {
-    squares.push_back(SquareOf(disc, kEdgeSigmas / extent_factor, finest_m));
-  }
+  std::vector<Square> squares(discs_grid.size());
+  ForEach(pool, squares.size(), [&](std::size_t i) {
+    squares[i] = SquareOf(discs_grid[i], kEdgeSigmas / extent_factor, finest_m);
+  });
   const SquaresOfBlocks squares_of = SortIntoBlocks(squares, grid, pool);
   DiscsOfCells densest(grid.Blocks());
   ParallelFor(pool, grid.Blocks(), 64, [&](std::size_t begin, std::size_t end) {
+    BlockCells cells;
     for (std::size_t b = begin; b < end; ++b) {
       densest[b].assign(static_cast<std::size_t>(grid.CellsPerBlock()), kNone);
-      for (const PointCell& cell : grid.Cells(b)) {
-        const Eigen::Vector3f middle = grid.MiddleOf(b, cell.code).cast<float>();
-        int& known = densest[b][static_cast<std::size_t>(cell.code)];
-        for (const int i : squares_of[b]) {
-          const float density = discs_grid[static_cast<std::size_t>(i)].density;
-          const bool is_denser =
-              known == kNone || density > discs_grid[static_cast<std::size_t>(known)].density;
-          if (!is_denser) continue;
-          const Square& square = squares[static_cast<std::size_t>(i)];
-          if (Meets(square, middle, 0.5f * kInsideCell * finest_m)) known = i;
-        }
+      if (squares_of[b].empty()) continue;
+      cells.Fill(grid, b);
+      for (const int i : squares_of[b]) {
+        const auto disc = static_cast<std::size_t>(i);
+        cells.Pass(squares[disc], 0.5f * kInsideCell * finest_m, i, discs_grid[disc].density);
+      }
+      for (std::size_t k = 0; k < grid.Cells(b).size(); ++k) {
+        densest[b][static_cast<std::size_t>(grid.Cells(b)[k].code)] = cells.Densest(k);
       }
     }
   });
   return densest;
 }
 
-std::vector<Disc> Moved(const SE3& T_to_from, std::span<const Disc> discs) {
+std::vector<Disc> Moved(const SE3& T_to_from, std::span<const Disc> discs, ThreadPool& pool) {
   const Eigen::Matrix3f rotation = T_to_from.RotationMatrix().cast<float>();
   const Eigen::Vector3f translation = T_to_from.Translation().cast<float>();
-  std::vector<Disc> moved;
-  moved.reserve(discs.size());
-  for (const Disc& disc : discs) {
-    moved.push_back(
-        {rotation * disc.mean + translation, rotation * disc.u, rotation * disc.v, disc.density});
-  }
+  std::vector<Disc> moved(discs.size());
+  ForEach(pool, discs.size(), [&](std::size_t i) {
+    const Disc& disc = discs[i];
+    moved[i] = {
+        rotation * disc.mean + translation, rotation * disc.u, rotation * disc.v, disc.density};
+  });
   return moved;
 }
 
@@ -276,8 +341,11 @@ Patch Moved(const SE3& T_to_from, Patch patch) {
   return patch;
 }
 
-FitJob MakeJob(const PointGrid& grid, std::span<const Disc> known, const PatchConfig& config) {
-  FitJob job{&grid, known, &config, EstimateNoise(grid, config.min_points), config.levels};
+FitJob MakeJob(const PointGrid& grid,
+               std::span<const Disc> known,
+               const PatchConfig& config,
+               ThreadPool& pool) {
+  FitJob job{&grid, known, &config, EstimateNoise(grid, config.min_points, pool), config.levels};
   while (job.finest_level > 0 && grid.CellSize(job.finest_level) < kMinCellInNoise * job.noise_m) {
     --job.finest_level;
   }
@@ -291,13 +359,13 @@ bool IsRenewed(const PointGrid::Place& place, const std::vector<BlockFit>& fits)
 /// [known] whether a disc's middle is not in a new patch's cell.
 std::vector<std::uint8_t> WhichStay(std::span<const Disc> discs_grid,
                                     const PointGrid& grid,
-                                    const std::vector<BlockFit>& fits) {
-  std::vector<std::uint8_t> stays;
-  stays.reserve(discs_grid.size());
-  for (const Disc& disc : discs_grid) {
-    const std::optional<PointGrid::Place> place = grid.Find(disc.mean);
-    stays.push_back(!place || !IsRenewed(*place, fits));
-  }
+                                    const std::vector<BlockFit>& fits,
+                                    ThreadPool& pool) {
+  std::vector<std::uint8_t> stays(discs_grid.size());
+  ForEach(pool, discs_grid.size(), [&](std::size_t i) {
+    const std::optional<PointGrid::Place> place = grid.Find(discs_grid[i].mean);
+    stays[i] = !place || !IsRenewed(*place, fits);
+  });
   return stays;
 }
 
@@ -320,9 +388,9 @@ PatchFit FitPatches(std::span<const PosedPoints> scans,
   if (scans.empty()) return result;
   const PointGrid grid(scans, sensor, config.cell_m, config.levels, pool);
   const SE3 T_grid_sensor = grid.FromMap() * scans.back().T_map_sensor;
-  const std::vector<Disc> discs_grid = Moved(T_grid_sensor, known);
+  const std::vector<Disc> discs_grid = Moved(T_grid_sensor, known, pool);
   const DiscsOfCells densest = DensestDiscs(discs_grid, grid, config.extent_factor, pool);
-  const FitJob job = MakeJob(grid, discs_grid, config);
+  const FitJob job = MakeJob(grid, discs_grid, config, pool);
   std::vector<BlockFit> fits(grid.Blocks());
   ParallelFor(pool, grid.Blocks(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) {
@@ -335,17 +403,19 @@ PatchFit FitPatches(std::span<const PosedPoints> scans,
   for (const BlockFit& fit : fits) {
     for (const Patch& patch : fit.patches) result.patches.push_back(Moved(T_sensor_grid, patch));
   }
-  const std::vector<std::uint8_t> stays = WhichStay(discs_grid, grid, fits);
+  const std::vector<std::uint8_t> stays = WhichStay(discs_grid, grid, fits, pool);
   for (std::size_t i = 0; i < stays.size(); ++i) {
     if (stays[i] == 0) result.replaced.push_back(i);
   }
   const Eigen::Matrix3f rotation = T_grid_sensor.RotationMatrix().cast<float>();
   const Eigen::Vector3f translation = T_grid_sensor.Translation().cast<float>();
-  for (const Eigen::Vector3f& p : scans.back().points) {
+  const std::span<const Eigen::Vector3f> points = scans.back().points;
+  result.covered.resize(points.size());
+  ForEach(pool, points.size(), [&](std::size_t i) {
     const std::optional<PointGrid::Place> place =
-        p.allFinite() ? grid.Find(rotation * p + translation) : std::nullopt;
-    result.covered.push_back(place && IsCovered(*place, fits, densest, stays));
-  }
+        points[i].allFinite() ? grid.Find(rotation * points[i] + translation) : std::nullopt;
+    result.covered[i] = place && IsCovered(*place, fits, densest, stays);
+  });
   return result;
 }
 

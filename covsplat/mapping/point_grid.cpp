@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 namespace covsplat {
 namespace {
@@ -51,14 +52,23 @@ Eigen::Matrix3d Moments::Covariance() const {
   return second / count - mean * mean.transpose();
 }
 
-/// All usable points in the frame of the grid, block after block.
+struct PointGrid::Point {
+  Eigen::Vector3f p_grid;
+  int code = 0;
+  int scan = 0;
+  float intensity = 0.0f;
+};
+
+/// Points of all scans as they come, and the blocks that they lie in.
+struct PointGrid::Located {
+  std::vector<Eigen::Vector3d> sensor;  ///< [scans] positions in the frame of the grid
+  std::vector<Point> points;            ///< [N]
+  std::vector<Eigen::Vector3i> block;   ///< [N]
+  std::vector<std::uint8_t> usable;     ///< [N]
+};
+
+/// All usable points, block after block.
 struct PointGrid::Sorted {
-  struct Point {
-    Eigen::Vector3f p_grid;
-    int code = 0;
-    int scan = 0;
-    float intensity = 0.0f;
-  };
   std::vector<Eigen::Vector3d> sensor;  ///< [scans] positions in the frame of the grid
   std::vector<Point> points;
   std::vector<std::size_t> begin;  ///< [B + 1]
@@ -76,61 +86,82 @@ PointGrid::PointGrid(std::span<const PosedPoints> scans,
   const Eigen::Vector3d here = scans.back().T_map_sensor.Translation();
   const Eigen::Vector3d corner = (here / block_m).array().round() * block_m;
   T_grid_map_ = SE3(Eigen::Quaterniond::Identity(), -corner);
-  const Sorted sorted = SortIntoBlocks(scans, sensor);
+  const Sorted sorted = SortIntoBlocks(Locate(scans, sensor, pool));
   cells_.resize(index_of_.size());
   ParallelFor(pool, cells_.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) cells_[b] = CellsOf(sorted, b);
+    std::vector<int> slot_of(static_cast<std::size_t>(CellsPerBlock()), -1);
+    for (std::size_t b = begin; b < end; ++b) cells_[b] = CellsOf(sorted, b, slot_of);
   });
 }
 
-PointGrid::Sorted PointGrid::SortIntoBlocks(std::span<const PosedPoints> scans,
-                                            const SensorModel& sensor) {
-  Sorted sorted;
-  std::size_t total = 0;
-  for (const PosedPoints& scan : scans) total += scan.points.size();
+PointGrid::Located PointGrid::Locate(std::span<const PosedPoints> scans,
+                                     const SensorModel& sensor,
+                                     ThreadPool& pool) const {
   const auto min_square = static_cast<float>(sensor.MinRange() * sensor.MinRange());
   const auto max_square = static_cast<float>(sensor.MaxRange() * sensor.MaxRange());
-  std::vector<Sorted::Point> points;
-  std::vector<int> block_of;  // -1: left out
-  std::vector<std::size_t> size;
-  points.reserve(total);
-  block_of.reserve(total);
+  std::size_t total = 0;
+  for (const PosedPoints& scan : scans) total += scan.points.size();
+  Located located;
+  located.points.resize(total);
+  located.block.resize(total);
+  located.usable.resize(total);
+  std::size_t first = 0;
   for (std::size_t s = 0; s < scans.size(); ++s) {
-    const SE3 T_grid_sensor = T_grid_map_ * scans[s].T_map_sensor;
+    const PosedPoints& scan = scans[s];
+    const SE3 T_grid_sensor = T_grid_map_ * scan.T_map_sensor;
     const Eigen::Matrix3f rotation = T_grid_sensor.RotationMatrix().cast<float>();
     const Eigen::Vector3f translation = T_grid_sensor.Translation().cast<float>();
-    sorted.sensor.push_back(T_grid_sensor.Translation());
-    for (std::size_t i = 0; i < scans[s].points.size(); ++i) {
-      const Eigen::Vector3f& p = scans[s].points[i];
-      const float square = p.squaredNorm();
-      const float intensity = scans[s].intensity.empty() ? 0.0f : scans[s].intensity[i];
-      const Eigen::Vector3f p_grid = rotation * p + translation;
-      const Eigen::Vector3i finest_cell = FinestCellOf(p_grid);
-      points.push_back({p_grid, CodeOf(finest_cell), static_cast<int>(s), intensity});
-      int block = -1;
-      if (square >= min_square && square <= max_square) {
-        const Eigen::Vector3i index = BlockOf(finest_cell);
-        const auto fresh = static_cast<int>(index_of_.size());
-        block = index_of_.size() < kMaxBlocks ? block_at_.FindOrInsert(index, fresh)
-                                              : block_at_.Find(index);
-        if (block == fresh) {
-          index_of_.push_back(index);
-          size.push_back(0);
-        }
+    located.sensor.push_back(T_grid_sensor.Translation());
+    ParallelFor(pool, scan.points.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const float square = scan.points[i].squaredNorm();
+        const Eigen::Vector3f p_grid = rotation * scan.points[i] + translation;
+        const Eigen::Vector3i finest_cell = FinestCellOf(p_grid);
+        const float intensity = scan.intensity.empty() ? 0.0f : scan.intensity[i];
+        const std::size_t at = first + i;
+        located.points[at] = {p_grid, CodeOf(finest_cell), static_cast<int>(s), intensity};
+        located.block[at] = BlockOf(finest_cell);
+        located.usable[at] = square >= min_square && square <= max_square;
       }
-      block_of.push_back(block);
-      if (block >= 0) ++size[static_cast<std::size_t>(block)];
-    }
+    });
+    first += scan.points.size();
   }
+  return located;
+}
+
+PointGrid::Sorted PointGrid::SortIntoBlocks(Located located) {
+  std::vector<int> block_of(located.points.size(), -1);  // -1: left out
+  std::vector<std::size_t> size;
+  std::optional<std::size_t> last;
+  for (std::size_t i = 0; i < located.points.size(); ++i) {
+    if (located.usable[i] == 0) continue;
+    // Neighbours along a beam mostly share a block.
+    const bool is_same = last && located.block[i] == located.block[*last];
+    block_of[i] = is_same ? block_of[*last] : FindOrAddBlock(located.block[i]);
+    last = i;
+    if (block_of[i] < 0) continue;
+    size.resize(index_of_.size(), 0);
+    ++size[static_cast<std::size_t>(block_of[i])];
+  }
+  Sorted sorted;
+  sorted.sensor = std::move(located.sensor);
   sorted.begin.assign(size.size() + 1, 0);
   for (std::size_t b = 0; b < size.size(); ++b) sorted.begin[b + 1] = sorted.begin[b] + size[b];
   sorted.points.resize(sorted.begin.back());
   std::vector<std::size_t> next(sorted.begin.begin(), sorted.begin.end() - 1);
-  for (std::size_t i = 0; i < points.size(); ++i) {
+  for (std::size_t i = 0; i < located.points.size(); ++i) {
     if (block_of[i] < 0) continue;
-    sorted.points[next[static_cast<std::size_t>(block_of[i])]++] = points[i];
+    sorted.points[next[static_cast<std::size_t>(block_of[i])]++] = located.points[i];
   }
   return sorted;
+}
+
+int PointGrid::FindOrAddBlock(const Eigen::Vector3i& index) {
+  if (index_of_.size() >= kMaxBlocks) return block_at_.Find(index);
+  const auto fresh = static_cast<int>(index_of_.size());
+  const int block = block_at_.FindOrInsert(index, fresh);
+  if (block == fresh) index_of_.push_back(index);
+  return block;
 }
 
 Eigen::Vector3i PointGrid::BlockOf(const Eigen::Vector3i& finest_cell) const {
@@ -145,12 +176,13 @@ int PointGrid::CodeOf(const Eigen::Vector3i& finest_cell) const {
   return spread(0) | spread(1) | spread(2);
 }
 
-std::vector<PointCell> PointGrid::CellsOf(const Sorted& sorted, std::size_t block) const {
+std::vector<PointCell> PointGrid::CellsOf(const Sorted& sorted,
+                                          std::size_t block,
+                                          std::span<int> slot_of) const {
   const Eigen::Vector3d corner = Corner(block);
-  std::vector<int> slot_of(static_cast<std::size_t>(CellsPerBlock()), -1);
   std::vector<PointCell> cells;
   for (std::size_t i = sorted.begin[block]; i < sorted.begin[block + 1]; ++i) {
-    const Sorted::Point& point = sorted.points[i];
+    const Point& point = sorted.points[i];
     int& slot = slot_of[static_cast<std::size_t>(point.code)];
     if (slot < 0) {
       slot = static_cast<int>(cells.size());
@@ -161,6 +193,7 @@ std::vector<PointCell> PointGrid::CellsOf(const Sorted& sorted, std::size_t bloc
         sorted.sensor[static_cast<std::size_t>(point.scan)] - corner,
         static_cast<double>(point.intensity));
   }
+  for (const PointCell& cell : cells) slot_of[static_cast<std::size_t>(cell.code)] = -1;
   std::sort(cells.begin(), cells.end(), [](const PointCell& a, const PointCell& b) {
     return a.code < b.code;
   });

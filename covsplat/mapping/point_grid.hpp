@@ -85,15 +85,25 @@ class PointGrid {
   void ForBlocksIn(const Eigen::AlignedBox3f& box_grid, F&& f) const;
 
  private:
+  struct Point;
+  struct Located;
   struct Sorted;
-  Sorted SortIntoBlocks(std::span<const PosedPoints> scans, const SensorModel& sensor);
+  Located Locate(std::span<const PosedPoints> scans,
+                 const SensorModel& sensor,
+                 ThreadPool& pool) const;
+  Sorted SortIntoBlocks(Located located);
+  /// Number of a block; none for new ones once there are too many.
+  int FindOrAddBlock(const Eigen::Vector3i& index);
   /// Coordinates of finest cells, of the block that holds one, and its code there.
   Eigen::Vector3i FinestCellOf(const Eigen::Vector3f& p_grid) const {
     return CellOf(finest_per_m_ * p_grid);
   }
   Eigen::Vector3i BlockOf(const Eigen::Vector3i& finest_cell) const;
   int CodeOf(const Eigen::Vector3i& finest_cell) const;
-  std::vector<PointCell> CellsOf(const Sorted& sorted, std::size_t block) const;
+  /// `slot_of`: [code] all -1, before and after.
+  std::vector<PointCell> CellsOf(const Sorted& sorted,
+                                 std::size_t block,
+                                 std::span<int> slot_of) const;
 
   SE3 T_grid_map_;
   double block_m_;

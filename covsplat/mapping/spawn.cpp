@@ -15,7 +15,6 @@ namespace {
 constexpr double kMinIncidence = 0.3;
 /// A Gaussian is no wider than this many standard deviations of the surface around it.
 constexpr double kSurfaceSigmas = 1.5;
-constexpr int kOccupied = 1;
 
 struct Site {
   int row = 0;
@@ -41,35 +40,51 @@ bool IsFlat(const PointCovariance& covariance) {
   return sigma[2] < kMaxThicknessShare * sigma[1];
 }
 
-/// Unexplained pixels on a known surface where no patch passes, at most one per voxel that is still
-/// empty. `covered`: of the keyframe's points, or empty if there are no patches.
+/// Unexplained pixels on a known surface where no patch passes. `covered`: of the keyframe's
+/// points, or empty if there are no patches.
+std::vector<Site> FindBareSites(const Keyframe& keyframe,
+                                const RenderOutput* render,
+                                std::span<const std::uint8_t> covered,
+                                const SpawnConfig& config) {
+  std::vector<Site> sites;
+  for (int row = 0; row < keyframe.point.Rows(); ++row) {
+    for (int column = 0; column < keyframe.point.Columns(); ++column) {
+      if (keyframe.surface(row, column) < 0) continue;
+      if (IsExplained(keyframe, render, {row, column}, config)) continue;
+      if (!covered.empty()) {
+        const auto point = static_cast<std::size_t>(keyframe.point(row, column));
+        const auto surface = static_cast<std::size_t>(keyframe.surface(row, column));
+        if (covered[point] != 0 || !IsFlat(keyframe.tracked.covariance[surface])) continue;
+      }
+      sites.push_back({row, column});
+    }
+  }
+  return sites;
+}
+
+/// Of bare sites the first in each voxel that is still empty.
 std::vector<Site> ChooseSites(const Keyframe& keyframe,
                               const RenderOutput* render,
                               std::span<const Disc> existing_sensor,
                               std::span<const std::uint8_t> covered,
                               const SpawnConfig& config) {
   const auto cells_per_m = static_cast<float>(1.0 / config.voxel_m);
-  VoxelHash taken(existing_sensor.size());
+  VoxelHash cells;  // of the sites only, since they are few
+  std::vector<Site> first;
+  for (const Site& site : FindBareSites(keyframe, render, covered, config)) {
+    const auto point = static_cast<std::size_t>(keyframe.point(site.row, site.column));
+    const Eigen::Vector3i cell = CellOf(cells_per_m * keyframe.tracked.points[point]);
+    const auto fresh = static_cast<int>(first.size());
+    if (cells.FindOrInsert(cell, fresh) == fresh) first.push_back(site);
+  }
+  std::vector<std::uint8_t> taken(first.size(), 0);
   for (const Disc& disc : existing_sensor) {
-    taken.FindOrInsert(CellOf(cells_per_m * disc.mean), kOccupied);
+    const int site = cells.Find(CellOf(cells_per_m * disc.mean));
+    if (site >= 0) taken[static_cast<std::size_t>(site)] = 1;
   }
-  std::vector<Site> sites;
-  for (int row = 0; row < keyframe.point.Rows(); ++row) {
-    for (int column = 0; column < keyframe.point.Columns(); ++column) {
-      if (keyframe.surface(row, column) < 0) continue;
-      if (IsExplained(keyframe, render, {row, column}, config)) continue;
-      const auto point = static_cast<std::size_t>(keyframe.point(row, column));
-      if (!covered.empty()) {
-        const auto surface = static_cast<std::size_t>(keyframe.surface(row, column));
-        if (covered[point] != 0 || !IsFlat(keyframe.tracked.covariance[surface])) continue;
-      }
-      const Eigen::Vector3i cell = CellOf(cells_per_m * keyframe.tracked.points[point]);
-      if (taken.Find(cell) >= 0) continue;
-      taken.FindOrInsert(cell, kOccupied);
-      sites.push_back({row, column});
-    }
-  }
-  return sites;
+  std::size_t i = 0;
+  std::erase_if(first, [&](const Site&) { return taken[i++] != 0; });
+  return first;
 }
 
 /// A measured point moved along its surface's normal to the middle of the measurements around it:

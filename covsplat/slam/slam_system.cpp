@@ -189,7 +189,7 @@ void SlamSystem::WaitForMap(double support, StageTimes& times) {
 }
 
 // One keyframe's way through the mapper; the target is published as soon as it holds the keyframe,
-// and again once it has been optimised.
+// and again once it has been optimised, unless the next keyframe waits for its turn.
 void SlamSystem::MapKeyframe(TrackedScan tracked, StageTimes& times) {
   if (loops_) {
     const ScopedTimer timer(times, "loops");
@@ -206,10 +206,10 @@ void SlamSystem::MapKeyframe(TrackedScan tracked, StageTimes& times) {
   if (config_.system.schedule == Schedule::kThreaded) PublishTarget();
   if (keyframes_.Empty()) {  // as always in lockstep
     mapper_.OptimizeNewest();
+    PublishTarget();
   } else {
     mapper_.OptimizeHurriedly();
   }
-  PublishTarget();
   AddTimes(times, mapper_.TakeTimes());
 }
 

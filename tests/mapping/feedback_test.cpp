@@ -54,7 +54,8 @@ class BuildTargetTest : public ::testing::Test {
   }
 
   ThreadPool pool_{2};
-  GaussianMap map_{std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value())};
+  GaussianMap map_{std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()),
+                   pool_};
 };
 
 TEST_F(BuildTargetTest, OfAnEmptyMapIsEmpty) { EXPECT_EQ(Build()->Size(), 0u); }
@@ -142,7 +143,8 @@ TEST_F(BuildTargetTest, IsAsPreciseFarFromTheOriginAsNearIt) {
   const SE3 far(near.Rotation(), near.Translation() + far_away);
   Add(surfels, near);
   const auto at_home = Build({}, near);
-  GaussianMap remote(std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()));
+  GaussianMap remote(std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()),
+                     pool_);
   remote.AddKeyframe(SphereKeyframe(far, 0.0f), Spawned(surfels));
   const auto abroad = BuildTarget(remote, std::nullopt, far, kReach, {});
   ASSERT_EQ(at_home->Size(), surfels.size());

@@ -81,7 +81,8 @@ class GaussianMapTest : public ::testing::Test {
 
   ThreadPool pool_{2};
   const SensorModel sensor_ = ReducedSensor();
-  GaussianMap map_{std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value())};
+  GaussianMap map_{std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()),
+                   pool_};
 };
 
 TEST_F(GaussianMapTest, KeepsSignalsWithTheirGaussiansThroughAddingAndPruning) {
@@ -171,7 +172,8 @@ TEST_F(GaussianMapTest, KeepsWhatWasLongUnseenWhileTheWayMayHaveDrifted) {
                    Eigen::Vector3d(5, 0, 0));
   }
   const auto through_after = [&](int keyframes, std::size_t moved) {
-    map_ = GaussianMap(std::move(MakeSplatEngine(Backend::kCpu, sensor_, {}, pool_).value()));
+    map_ =
+        GaussianMap(std::move(MakeSplatEngine(Backend::kCpu, sensor_, {}, pool_).value()), pool_);
     std::vector<Eigen::Vector3d> points = wall;
     for (std::size_t i = 0; i < moved; ++i) points[i] *= 0.8;
     map_.AddKeyframe(SphereKeyframe(SE3(), 5.0f), GaussiansAt(points));

@@ -75,13 +75,14 @@ class ManageMapTest : public ::testing::Test {
 
   ThreadPool pool_{2};
   const SE3 pose_ = MakePose(0, 0, 0.7, 100, -40, 1);
-  GaussianMap map_{std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value())};
+  GaussianMap map_{std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()),
+                   pool_};
 };
 
 TEST_F(ManageMapTest, CoversPlanesThatLookTheSameAfterwards) {
   // So near and so fine that pixels are smaller than Gaussians.
   const SensorModel fine = UniformSensorModel(256, 2048, -0.25 * M_PI, 0.25 * M_PI, 0.5, 60.0);
-  map_ = GaussianMap(std::move(MakeSplatEngine(Backend::kCpu, fine, {}, pool_).value()));
+  map_ = GaussianMap(std::move(MakeSplatEngine(Backend::kCpu, fine, {}, pool_).value()), pool_);
   SpawnedGaussians wall = Wall(0.1f, 0.8, 2.0);
   const int keyframe = map_.Engine().AddAnchor(pose_);
   for (GaussianSignals& signals : wall.signals) signals.trackable = true;
@@ -109,8 +110,8 @@ TEST_F(ManageMapTest, CoversPlanesThatLookTheSameAfterwards) {
 
 TEST_F(ManageMapTest, DoesWhatItsModeSays) {
   const auto size_after = [&](ManageMode mode) {
-    map_ =
-        GaussianMap(std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()));
+    map_ = GaussianMap(
+        std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()), pool_);
     Add(Wall(0.1f));
     ManageConfig config = In(mode);
     config.split.control_quantile = 0.0;

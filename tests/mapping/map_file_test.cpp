@@ -76,7 +76,7 @@ class MapFileTest : public testing::Test {
   fs::path folder_;
   ThreadPool pool_{1};
   SensorModel sensor_ = UniformSensorModel(16, 64, -0.4, 0.4, 0.5, 50.0);
-  GaussianMap map_{MakeEngine(sensor_, pool_)};
+  GaussianMap map_{MakeEngine(sensor_, pool_), pool_};
 };
 
 TEST_F(MapFileTest, GaussiansAreInTheMapFrame) {

@@ -164,7 +164,7 @@ TEST_F(SpawnGaussiansTest, AverageAwayMostOfTheNoiseOfTheirMeasurements) {
 }
 
 TEST_F(SpawnGaussiansTest, CoverARoomOnceAndNotTwice) {
-  GaussianMap map(std::move(MakeSplatEngine(Backend::kCpu, sensor_, {}, pool_).value()));
+  GaussianMap map(std::move(MakeSplatEngine(Backend::kCpu, sensor_, {}, pool_).value()), pool_);
   const SE3 pose = MakePose(0.02, -0.03, 0.4, 1.0, -1.0, 0.2);
   const Keyframe first = StillKeyframe(Room(), sensor_, pose, kNoise, 1, pool_);
   const Keyframe again = StillKeyframe(Room(), sensor_, pose, kNoise, 2, pool_);
@@ -188,7 +188,7 @@ TEST_F(SpawnGaussiansTest, LeaveOccupiedVoxelsAloneHoweverBadlyTheyAreExplained)
 }
 
 TEST_F(SpawnGaussiansTest, CoverWhatHasAppearedAndNothingElse) {
-  GaussianMap map(std::move(MakeSplatEngine(Backend::kCpu, sensor_, {}, pool_).value()));
+  GaussianMap map(std::move(MakeSplatEngine(Backend::kCpu, sensor_, {}, pool_).value()), pool_);
   const Keyframe before = StillKeyframe(Room(), sensor_, SE3(), kNoise, 1, pool_);
   const SpawnedGaussians all = Spawn(before);
   map.AddKeyframe(before, all);
@@ -370,7 +370,7 @@ TEST_F(SpawnGaussiansTest, OfPatchesLieCloserToTheSurfaceThanPixels) {
 
 TEST_F(SpawnGaussiansTest, OfPatchesReplaceWhatWasMadeOfLess) {
   const Keyframe first = StillKeyframe(Room(), sensor_, SE3(), kNoise, 1, pool_);
-  GaussianMap map(std::move(MakeSplatEngine(Backend::kCpu, sensor_, {}, pool_).value()));
+  GaussianMap map(std::move(MakeSplatEngine(Backend::kCpu, sensor_, {}, pool_).value()), pool_);
   map.AddKeyframe(first, Spawn(first));
   const std::size_t before = map.Size();
   const PatchFit fit = FitPatches(

@@ -11,7 +11,8 @@ namespace {
 class TrainingViewsTest : public ::testing::Test {
  protected:
   TrainingViewsTest()
-      : map_(std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value())) {}
+      : map_(std::move(MakeSplatEngine(Backend::kCpu, ReducedSensor(), {}, pool_).value()), pool_) {
+  }
 
   /// One keyframe every so many metres along x.
   void Drive(TrainingViews& views, int keyframes, double step_m) {
