@@ -82,7 +82,7 @@ bench-ablation: setup build-release .venv/peers  ## Run the paper's ablations (h
 	  $(if $(ONLY),--only '$(ONLY)',--update docs/benchmarks.md)
 
 # The truth is what the simulator writes last.
-bench-growth: setup build-release .venv/peers simulate-city  ## A drive of 10 km, which takes 20 GB: docs/benchmarks.md
+bench-growth: setup build-release .venv/peers simulate-city  ## A drive of 10 km, which takes 15 GB: docs/benchmarks.md
 	PYTHONPATH=bench/peers .venv/bin/python bench/growth/run.py --covsplat build/release/apps/covsplat \
 	  --recording bench_out/city --out bench_out/growth --update docs/benchmarks.md
 

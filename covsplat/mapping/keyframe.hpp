@@ -57,6 +57,7 @@ struct Keyframe {
 struct KeyframeConfig {
   double max_distance_m = 2.0;
   double max_angle_deg = 20.0;
+  double busy_factor = 2.0;
   double min_overlap = 0.8;
   double min_support = 0.85;
   double wait_support = 0.85;
@@ -68,6 +69,11 @@ struct KeyframeConfig {
     v.Field(
         "max_distance_m", c.max_distance_m, Range{0.01, 100.0}, "a keyframe after moving this far");
     v.Field("max_angle_deg", c.max_angle_deg, Range{1.0, 360.0}, "... or turning this much");
+    v.Field("busy_factor",
+            c.busy_factor,
+            Range{1.0, 10.0},
+            "... both so many times as far while two keyframes or more wait to be mapped (threaded "
+            "only)");
     v.Field("min_overlap",
             c.min_overlap,
             Range{0.0, 1.0},

@@ -15,6 +15,7 @@ constexpr double kMaxPoseGapS = 0.5;
 // Per scan, of the inlier ratio that is usual and of the best.
 constexpr double kForget = 0.1;
 constexpr double kForgetBest = 0.01;
+constexpr int kBusyKeyframes = 2;
 constexpr std::size_t kSearchPoints = 1500;
 constexpr int kSearchIterations = 20;
 
@@ -312,7 +313,8 @@ void Tracker::Conclude(const Scan& scan,
   if (result.is_keyframe) CountKeyframe(motion.T_map_sensor);
 }
 
-// Overlap with a target that lacks a keyframe would ask for that keyframe again.
+// Overlap with a target that lacks a keyframe would ask for that keyframe again. A mapper that has
+// fallen behind gets fewer keyframes, not later ones: tracking needs the map where the sensor is.
 bool Tracker::WantsKeyframe(const TrackResult& result) const {
   if (!T_odom_keyframe_) return true;
   const KeyframeConfig& policy = config_.keyframe;
@@ -320,8 +322,9 @@ bool Tracker::WantsKeyframe(const TrackResult& result) const {
   const bool leaves_map = result.keyframes_waiting == 0 &&
                           (result.overlap < policy.min_overlap ||
                            result.align.inlier_ratio < policy.min_support * fresh_inlier_ratio_);
-  return moved.tail<3>().norm() > policy.max_distance_m ||
-         moved.head<3>().norm() > policy.max_angle_deg * kDegree || leaves_map ||
+  const double stretch = result.keyframes_waiting >= kBusyKeyframes ? policy.busy_factor : 1.0;
+  return moved.tail<3>().norm() > stretch * policy.max_distance_m ||
+         moved.head<3>().norm() > stretch * policy.max_angle_deg * kDegree || leaves_map ||
          scans_since_keyframe_ >= policy.max_scans;
 }
 

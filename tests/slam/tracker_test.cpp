@@ -372,6 +372,14 @@ TEST_F(KeyframePolicyTest, WantsOneAfterADistance) {
   EXPECT_EQ(Keyframes(config, Drive, 8), (Ordinals{3, 6}));
 }
 
+TEST_F(KeyframePolicyTest, WantsFewerWhileSomeWaitToBeMapped) {
+  TrackerConfig config = Never();
+  config.keyframe.max_distance_m = 0.4;  // 15 cm per scan
+  EXPECT_EQ(Keyframes(config, Drive, 14), (Ordinals{3, 6, 12}));
+  config.keyframe.busy_factor = 1.0;
+  EXPECT_EQ(Keyframes(config, Drive, 14), (Ordinals{3, 6, 9, 12}));
+}
+
 TEST_F(KeyframePolicyTest, WantsOneAfterATurn) {
   TrackerConfig config = Never();
   config.keyframe.max_angle_deg = 14.0;  // 5.7 deg per scan
