@@ -271,8 +271,8 @@ class BlockCells {
         return std::abs(to_square(axis, 0) * x_[i] + to_square(axis, 1) * y_[i] +
                         to_square(axis, 2) * z_[i] - offset[axis]);
       };
-      const bool is_met = (apart(0) <= reach[0]) & (apart(1) <= reach[1]) & (apart(2) <= reach[2]);
-      const bool is_densest = is_met & (density > density_[i]);
+      const bool is_densest = density > density_[i] && apart(0) <= reach[0] &&
+                              apart(1) <= reach[1] && apart(2) <= reach[2];
       density_[i] = is_densest ? density : density_[i];
       disc_[i] = is_densest ? disc : disc_[i];
     }
