@@ -16,6 +16,18 @@ void ForEach(ThreadPool& pool, std::size_t count, F&& f) {
   });
 }
 
+/// All that f(i, found) appends, in the order of i.
+template <class T, class F>
+std::vector<T> Collect(ThreadPool& pool, std::size_t count, std::size_t grain, F&& f) {
+  std::vector<std::vector<T>> parts((count + grain - 1) / grain);
+  ParallelFor(pool, count, grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) f(i, parts[begin / grain]);
+  });
+  std::vector<T> all;
+  for (const std::vector<T>& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
 constexpr double kNoiseWithoutCells = 0.02;
 /// Cosine of the flattest incidence at which the noise of ranges can be told.
 constexpr double kHeadOn = 0.5;
@@ -83,17 +95,10 @@ void AppendNoise(std::span<const PointCell> block,
 
 /// Standard deviation of ranges to flat surfaces: the median among the eighths of the blocks.
 double EstimateNoise(const PointGrid& grid, int min_points, ThreadPool& pool) {
-  constexpr std::size_t kChunk = 256;
-  std::vector<std::vector<double>> parts((grid.Blocks() + kChunk - 1) / kChunk);
-  ParallelFor(pool, grid.Blocks(), kChunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) {
-      AppendNoise(grid.Cells(b), grid.Levels(), min_points, parts[begin / kChunk]);
-    }
-  });
-  std::vector<double> variance;
-  for (const std::vector<double>& part : parts) {
-    variance.insert(variance.end(), part.begin(), part.end());
-  }
+  auto variance =
+      Collect<double>(pool, grid.Blocks(), 256, [&](std::size_t block, std::vector<double>& found) {
+        AppendNoise(grid.Cells(block), grid.Levels(), min_points, found);
+      });
   if (variance.empty()) return kNoiseWithoutCells;
   const auto middle = variance.begin() + static_cast<std::ptrdiff_t>(variance.size() / 2);
   std::nth_element(variance.begin(), middle, variance.end());
@@ -226,22 +231,18 @@ SquaresOfBlocks SortIntoBlocks(std::span<const Square> squares,
     std::size_t block;
     int square;
   };
-  constexpr std::size_t kChunk = 1024;
-  std::vector<std::vector<Meeting>> meetings((squares.size() + kChunk - 1) / kChunk);
-  ParallelFor(pool, squares.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      grid.ForBlocksIn(squares[i].Box(), [&](std::size_t block) {
-        const auto half_m = 0.5 * grid.CellSize(0);
-        const Eigen::Vector3d middle = grid.Corner(block) + Eigen::Vector3d::Constant(half_m);
-        if (!Meets(squares[i], middle.cast<float>(), static_cast<float>(half_m))) return;
-        meetings[begin / kChunk].push_back({block, static_cast<int>(i)});
+  const auto half_m = static_cast<float>(0.5 * grid.CellSize(0));
+  const auto meetings =
+      Collect<Meeting>(pool, squares.size(), 1024, [&](std::size_t i, std::vector<Meeting>& found) {
+        grid.ForBlocksIn(squares[i].Box(), [&](std::size_t block) {
+          const Eigen::Vector3d corner = grid.Corner(block);
+          const Eigen::Vector3d middle = corner.array() + 0.5 * grid.CellSize(0);
+          if (!Meets(squares[i], middle.cast<float>(), half_m)) return;
+          found.push_back({block, static_cast<int>(i)});
+        });
       });
-    }
-  });
   SquaresOfBlocks of_blocks(grid.Blocks());
-  for (const std::vector<Meeting>& some : meetings) {
-    for (const Meeting& meeting : some) of_blocks[meeting.block].push_back(meeting.square);
-  }
+  for (const Meeting& meeting : meetings) of_blocks[meeting.block].push_back(meeting.square);
   return of_blocks;
 }
 
